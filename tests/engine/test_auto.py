@@ -83,6 +83,17 @@ def test_ways_without_second_gathers_have_to_promise_a_fifth_less(less, chosen):
     assert picked.measured.candidate == chosen
 
 
+@pytest.mark.parametrize(("less", "chosen"), [(0.85, CACHE_CORNERS), (0.65, PROGRESSIVE)])
+def test_photons_shown_directly_have_to_promise_less_than_a_gather(less, chosen):
+    """A trial thinks too well of them: where they promised as much as a gather, they never had it."""
+
+    def option(way: Candidate, error: float) -> Option:
+        return Option(Measured(way, Costs(0.1, 0.0), 1.0, radius=0.01), Numbers(300_000), 20.0, error, 10.0)
+
+    picked = _picked([option(PROGRESSIVE, less * 1e-3), option(CACHE_CORNERS, 1e-3)], lambda o: o.error)
+    assert picked.measured.candidate == chosen
+
+
 def test_large_pictures_are_planned_for_more_than_their_first_passes(cornell, pool):
     """Of 16 megapixels ten seconds are a few passes; with a time that somebody gives they are what they are."""
     large = with_values(Settings(), {"camera.width": 4096, "camera.height": 4096})

@@ -206,6 +206,19 @@ def test_stored_set_on_many_surfaces_is_that_of_plain_searches(rounds, many_surf
     assert 0.2 < len(kept) / len(photons) < 0.8
 
 
+def test_groups_of_a_round_follow_one_another_as_they_lie():
+    """From one to the next it is hardly farther than leaves are wide, wherever in the tree leaves were split."""
+    made = DensityControl(STEP, GUARDED, 1)
+    photons, codes = plane(20_000, 12), np.full(20_000, UP, u4)
+    made.add(photons, codes, np.full(20_000, 2000, f4), in_order)
+    groups = made.groups(photons, codes, in_order)
+    middles = np.array([photons[chosen, :2].mean(axis=0) for chosen in np.split(groups.order, groups.starts[1:-1])])
+    assert len(middles) > 100
+    wide = np.sqrt(1 / len(middles))
+    assert np.median(np.linalg.norm(np.diff(middles, axis=0), axis=1)) < 2 * wide
+    np.testing.assert_array_equal(np.sort(groups.order), np.arange(20_000))
+
+
 def test_threads_do_not_matter():
     photons = plane(60_000, 6)
     pool = WorkPool(3)

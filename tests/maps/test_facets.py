@@ -7,7 +7,7 @@ from pmviewer.importance.rules import important_weight, probability_of
 from pmviewer.maps.importance.build import build_importance
 from pmviewer.maps.importance.facets import MOST, facets_of
 from pmviewer.maps.importance.importance_map import Importons
-from pmviewer.maps.importance.look_up import FLATNESS
+from pmviewer.maps.importance.look_up import FLATNESS, importances
 from pmviewer.maps.importance.nearest_of_all import nearest_importances, node_boxes
 from pmviewer.maps.importance.together import importances_on
 from pmviewer.maps.record import decode_directions
@@ -92,6 +92,23 @@ def test_importance_on_facets_is_that_of_the_nearest_importon(room):
         wrong += found[i] not in expected
     assert 0.2 < (found[some] > 0).mean() < 0.9
     assert wrong <= 2  # at the rim of a reach, by rounding
+
+
+@pytest.mark.parametrize("side", [0.002, 0.02, 0.2])
+def test_importance_of_places_that_follow_one_another_is_that_of_each_alone(room, side):
+    """Photons of one leaf: near one another, with one normal; the first as close as importons lie, the last so far
+    apart that they have more of them around than are looked at together. On all surfaces and a little off them."""
+    rng = np.random.default_rng(9)
+    at, normals, codes = places(rng, 60)
+    spread = rng.uniform(-side, side, (len(at), 40, 3))
+    spread -= (spread * normals[:, None]).sum(axis=2, keepdims=True) * normals[:, None] * rng.random((len(at), 40, 1))
+    many = (at[:, None] + spread).reshape(-1, 3).astype(f4)
+    found, alone = np.full(len(many), -1, f4), np.empty(len(many), f4)
+    facets, of_many = facets_of(room), np.repeat(codes, 40)
+    importances_on(facets.maps, facets.shapes, facets.boxes, facets.reached, many, of_many, found, 0, len(many))
+    importances(room.record, many, np.repeat(normals, 40, axis=0), alone, 0, len(many))
+    assert 0.05 < (alone > 0).mean() < 0.95
+    assert np.count_nonzero(found != alone) <= 1e-3 * len(many)  # equally far, but for rounding
 
 
 def test_no_importance_at_no_place(room):

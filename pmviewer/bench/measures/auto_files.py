@@ -45,7 +45,7 @@ CHOSEN = (
     "staircase, what fewer photons have to promise with a living room, a staircase, Veach's room and three boxes, and "
     "how far look-ups near edges are trusted with the living room"
 )
-"""CORNERS, CACHE_CORNERS, LESS_BIAS, MORE_COST, RECORDS and EDGES of `pmviewer.engine.auto.candidates`,
+"""CORNERS, CACHE_CORNERS, LESS_BIAS, MORE_COST, RECORDS, EDGES and SHOWN of `pmviewer.engine.auto.candidates`,
 `pmviewer.render.direct.by_lobes`, HIDDEN of `pmviewer.engine.auto.widths`, `pmviewer.render.adaptive`, GATHERED_ORDER
 and STEADY of `pmviewer.engine.auto.bias`, the powers of `pmviewer.engine.auto.model` and `measured`, HELD and MOST of
 `pmviewer.engine.auto.sparse`, and FEWER_PHOTONS of `pmviewer.engine.auto.choose`, said in the targets' own lines."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from pmviewer.engine.auto.bias import Bias, way_of
-from pmviewer.engine.auto.candidates import CACHE, PROGRESSIVE, Candidate, assignments, candidates
+from pmviewer.engine.auto.candidates import CACHE, PROGRESSIVE, SHOWN, Candidate, assignments, candidates
 from pmviewer.engine.auto.measured import Measured, Numbers, Trial, Widths
 from pmviewer.engine.auto.model import BETTER, FEWEST, Option, bias_of, in_time, numbers_for, to_error
 from pmviewer.engine.auto.runs import TooDearError
@@ -145,14 +145,15 @@ def _to_error(m: Measured, error: float) -> list[Option]:
 
 
 def _picked(found: list[Option], promised: Callable[[Option], float]) -> Option:
-    """The one that promises least, fewer photons than usual being counted for more (`FEWER_PHOTONS`); of ways to
-    gather, so is bias that a trial overlooks (`Candidate.overlooked`). Of its candidate the numbers that
-    `_preference` likes best among those that are hardly worse: those of two trials are then the same more often. The
-    default unless another is clearly better."""
+    """The one that promises least, fewer photons than usual being counted for more (`FEWER_PHOTONS`), and photons shown
+    directly (`SHOWN`); of ways to gather, so is bias that a trial overlooks (`Candidate.overlooked`). Of its candidate
+    the numbers that `_preference` likes best among those that are hardly worse: those of two trials are then the same
+    more often. The default unless another is clearly better."""
 
     def of(option: Option) -> float:
         few = option.numbers.N < _DEFAULT.N
-        return promised(option) * (FEWER_PHOTONS if few else 1.0)
+        shown = option.measured.candidate.is_like(PROGRESSIVE)
+        return promised(option) * (FEWER_PHOTONS if few else 1.0) * (SHOWN if shown else 1.0)
 
     best = min(found, key=of)
     if best.measured.candidate.gathers:
