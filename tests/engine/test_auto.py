@@ -18,6 +18,7 @@ from pmviewer.engine.auto.candidates import (
     LIGHTS_CAUSTICS,
     PATH,
     PROGRESSIVE,
+    SHOWN,
     THICKER,
     Candidate,
     assignments,
@@ -84,14 +85,15 @@ def test_ways_without_second_gathers_have_to_promise_a_fifth_less(less, chosen):
 
 
 @pytest.mark.parametrize(("less", "chosen"), [(0.85, CACHE_CORNERS), (0.65, PROGRESSIVE)])
-def test_photons_shown_directly_have_to_promise_less_than_a_gather(less, chosen):
+def test_photons_shown_directly_have_to_promise_less_than_a_gather_for_a_time(less, chosen):
     """A trial thinks too well of them: where they promised as much as a gather, they never had it."""
 
     def option(way: Candidate, error: float) -> Option:
         return Option(Measured(way, Costs(0.1, 0.0), 1.0, radius=0.01), Numbers(300_000), 20.0, error, 10.0)
 
-    picked = _picked([option(PROGRESSIVE, less * 1e-3), option(CACHE_CORNERS, 1e-3)], lambda o: o.error)
-    assert picked.measured.candidate == chosen
+    found = [option(PROGRESSIVE, less * 1e-3), option(CACHE_CORNERS, 1e-3)]
+    assert _picked(found, lambda o: o.error, SHOWN).measured.candidate == chosen
+    assert _picked(found, lambda o: o.error).measured.candidate == PROGRESSIVE
 
 
 def test_large_pictures_are_planned_for_more_than_their_first_passes(cornell, pool):

@@ -22,7 +22,8 @@ chosen in a quarter of a living room's trials, promised as little as with second
 times the error."""
 SHOWN = 1.25
 """What errors of photons that are shown directly count as beside those of a gather: of 23 scenes and files, ten seconds
-each, none had less by them, and where trials promised less than twice as much, 1.0 to 2.9 times as much was true."""
+each, none had less by them, and where trials promised less than twice as much, 1.0 to 2.9 times as much was true. Not
+where an error is asked for: `ring_caustic` is at 5e-3 by them in 0.8 of the time."""
 
 
 @dataclass(frozen=True)

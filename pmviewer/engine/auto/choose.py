@@ -126,7 +126,7 @@ def _by_time(tried: Trial, seconds: float) -> Option:
     enough = [option for option in every if option.passes >= FEWEST]
     if not enough:
         return max(every, key=lambda option: option.passes)
-    return _picked(enough, lambda option: option.error)
+    return _picked(enough, lambda option: option.error, SHOWN)
 
 
 def _by_error(tried: Trial, error: float) -> Option:
@@ -144,16 +144,15 @@ def _to_error(m: Measured, error: float) -> list[Option]:
     return [to_error(m, numbers, error) for numbers in numbers_for(m, lambda n: to_error(m, n, error).expected)]
 
 
-def _picked(found: list[Option], promised: Callable[[Option], float]) -> Option:
+def _picked(found: list[Option], promised: Callable[[Option], float], shown: float = 1.0) -> Option:
     """The one that promises least, fewer photons than usual being counted for more (`FEWER_PHOTONS`), and photons shown
-    directly (`SHOWN`); of ways to gather, so is bias that a trial overlooks (`Candidate.overlooked`). Of its candidate
-    the numbers that `_preference` likes best among those that are hardly worse: those of two trials are then the same
-    more often. The default unless another is clearly better."""
+    directly `shown` times; of ways to gather, so is bias that a trial overlooks (`Candidate.overlooked`). Of its
+    candidate the numbers that `_preference` likes best among those that are hardly worse: those of two trials are then
+    the same more often. The default unless another is clearly better."""
 
     def of(option: Option) -> float:
-        few = option.numbers.N < _DEFAULT.N
-        shown = option.measured.candidate.is_like(PROGRESSIVE)
-        return promised(option) * (FEWER_PHOTONS if few else 1.0) * (SHOWN if shown else 1.0)
+        few, directly = option.numbers.N < _DEFAULT.N, option.measured.candidate.is_like(PROGRESSIVE)
+        return promised(option) * (FEWER_PHOTONS if few else 1.0) * (shown if directly else 1.0)
 
     best = min(found, key=of)
     if best.measured.candidate.gathers:
