@@ -1,4 +1,4 @@
-"""Importance of many places: importons by the surfaces that they lie on, so that a search meets no others.
+"""Importons by the surfaces that they lie on, so that a search for those of a place meets no others.
 
 A place has the importance of the nearest importon on its side, if that one reaches so far
 (`pmviewer.maps.importance.look_up`). Of the importons within the farthest reach most face another way or lie on
