@@ -42,8 +42,9 @@ CHOSEN = (
     "the bricks and the staircase, what second gathers farther out bring with the bricks, which power of the radius "
     "the bias of gather rays has with a hall, that radii wait with eight files, how noise is taken to fall with ten, "
     "how wide look-ups are where photons lie far apart with a coated ball, five lamps, a hall, a living room and a "
-    "staircase, what fewer photons have to promise with a living room, a staircase, Veach's room and three boxes, and "
-    "how far look-ups near edges are trusted with the living room"
+    "staircase, what fewer photons have to promise with a living room, a staircase, Veach's room and three boxes, "
+    "how far look-ups near edges are trusted with the living room, and what photons shown directly have to promise "
+    "with all of them"
 )
 """CORNERS, CACHE_CORNERS, LESS_BIAS, MORE_COST, RECORDS, EDGES and SHOWN of `pmviewer.engine.auto.candidates`,
 `pmviewer.render.direct.by_lobes`, HIDDEN of `pmviewer.engine.auto.widths`, `pmviewer.render.adaptive`, GATHERED_ORDER

@@ -52,9 +52,9 @@ from pmviewer.maps.density.growing_tree import (
     reserved,
     search,
 )
-from pmviewer.maps.density.shares import ROW, add_share, hand_out
+from pmviewer.maps.density.shares import ROW, add_share, hand_out, share_of
 from pmviewer.maps.density.together import AMONG_WORDS
-from pmviewer.maps.photon_words import decode_direction, decode_powers
+from pmviewer.maps.photon_words import decode_direction
 from pmviewer.tasks import Runner
 
 FLATNESS = np.float32(0.2)
@@ -129,19 +129,17 @@ def _settle(trees, control, arrivals, stored, rows, undecided, kept):
         n, r2 = normalize(decode_direction(arrivals.normals[i])), farthest(control, need, index)
         count, r2 = search(tree, p, n, need, control.limits, r2, scratch)
         count = sharing(control, n, need, index, rows, count, r2, scratch)
-        red, green, blue = decode_powers(words[i, 4], words[i, 5])
+        r, g, b = share_of(words, i, max(count, _i8(1)))
         if count == 0:
             new = size[2]
             for w in range(6):
                 stored.rows[new, w] = words[i, w]
             stored.needs[new] = need
-            powers[new, 0], powers[new, 1], powers[new, 2] = _f8(red), _f8(green), _f8(blue)
+            powers[new, 0], powers[new, 1], powers[new, 2] = r, g, b
             insert(tree, size, p, need, words[i, 3], _i4(new), leaf_scratch)
             size[2] += 1
             kept[i] = True
             continue
-        share = _f8(1.0) / _f8(count)
-        r, g, b = _f8(red) * share, _f8(green) * share, _f8(blue) * share
         for j in range(count):
             add_share(sums, stack_get_i8(scratch.keys, j) & _i8(0xFFFFFFFF), r, g, b)
 
@@ -213,7 +211,7 @@ class DensityControl:
         rows = self._rows.ctypes.data
         undecided = np.ones(n, bool)
         if self.stored:
-            self._compare(arrivals, groups or self.groups(photons, normals, run), undecided, run)
+            undecided = self._compared(tree, arrivals, groups or self.groups(photons, normals, run), run)
         before, stored = self.stored, Stored(self._rows, self._needs, self._powers, self.size)
         run([lambda: _settle(tree.record, self.control, arrivals, stored, rows, undecided, kept)])
         self.arrived += n
@@ -221,10 +219,10 @@ class DensityControl:
         assert self.stored - before == np.count_nonzero(kept)
         self.redistributed += n - (self.stored - before)
 
-    def _compare(self, arrivals: Arrivals, groups: Groups, undecided: NDArray[np.bool_], run: Runner) -> None:
-        """Compare a round's photons with what was stored before it; false in `undecided` (n,) for those that are not
-        stored, whose power their neighbours get: of near photons these are the same."""
-        tree, order = self._reserve(self.stored), groups.order
+    def _compared(self, tree: GrowingTree, arrivals: Arrivals, groups: Groups, run: Runner) -> NDArray[np.bool_]:
+        """Compare a round's photons with what was stored before it. Those that are not stored hand out their power in
+        the order of the groups: near ones have the same neighbours. Returns which are still undecided, (n,)."""
+        order = groups.order
         rows, n = self._rows.ctypes.data, len(order)
         placed = Placed(order, groups.photons, groups.normals, arrivals.needs[order], arrivals.first)
         counts, neighbours = np.empty(n, np.int32), np.empty((n, M), np.int32)
@@ -236,7 +234,9 @@ class DensityControl:
 
         run([partial(some, *part) for part in groups.parts(CHUNK)])
         run([lambda: hand_out(groups.photons.view(np.uint32), counts, neighbours, self._powers)])
+        undecided = np.empty(n, bool)
         undecided[order] = counts == 0
+        return undecided
 
     def result(self) -> Controlled:
         """The map as it stands; the arrays are this object's own."""

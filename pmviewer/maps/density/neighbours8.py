@@ -9,15 +9,13 @@ from numba.core import cgutils
 
 from pmviewer.kernels.memory import F32, I8, I32, at_address, with_twin
 from pmviewer.maps.search.simd import (
-    FAST,
     ROW_BYTES,
     VECTOR,
     WIDTH,
     bits_of,
-    dot_of,
-    intrinsic,
+    counted,
+    counted_of,
     load_eight,
-    offsets,
     splat,
 )
 
@@ -29,25 +27,15 @@ density and number. What is not taken is infinitely far."""
 
 def _plainly(block, p, n, steepness, ceiling):
     """In plain Python: squared distances of eight, and which need no more than `ceiling`."""
-    rows = [block + row * ROW_BYTES for row in range(3)]
-    d = offsets(*rows, *p)
-    height = sum(a * c for a, c in zip(d, n))
-    counted = np.maximum(sum(a * a for a in d), steepness * height * height)
-    return counted, at_address(block + NEED * ROW_BYTES, WIDTH, np.float32) <= ceiling
+    far, _ = counted([block + row * ROW_BYTES for row in range(3)], p, n, steepness)
+    return far, at_address(block + NEED * ROW_BYTES, WIDTH, np.float32) <= ceiling
 
 
 def _built(builder, block, p, n, steepness, ceiling):
     """The same in LLVM's builder."""
     row = [builder.add(block, ir.Constant(block.type, ROW_BYTES * j)) for j in range(NEED + 1)]
-    normal = [splat(builder, x) for x in cgutils.unpack_tuple(builder, n, 3)]
-    d = [
-        builder.fsub(load_eight(builder, address), splat(builder, coordinate), flags=FAST)
-        for address, coordinate in zip(row, cgutils.unpack_tuple(builder, p, 3))
-    ]
-    height = dot_of(builder, d, normal)
-    above = builder.fmul(builder.fmul(height, height, flags=FAST), splat(builder, steepness), flags=FAST)
-    counted = intrinsic(builder, "maxnum", dot_of(builder, d, d), above)
-    return counted, builder.fcmp_ordered("<=", load_eight(builder, row[NEED]), splat(builder, ceiling))
+    far, _ = counted_of(builder, row[:3], p, n, steepness)
+    return far, builder.fcmp_ordered("<=", load_eight(builder, row[NEED]), splat(builder, ceiling))
 
 
 def _bits(builder, mask):
@@ -55,9 +43,9 @@ def _bits(builder, mask):
 
 
 def _neighbours8(block, p, n, steepness, r2, ceiling, squared):
-    counted, small = _plainly(block, p, n, steepness, ceiling)
-    squared.view(np.float32)[:WIDTH] = counted
-    return bits_of((counted < r2) & small)
+    far, small = _plainly(block, p, n, steepness, ceiling)
+    squared.view(np.float32)[:WIDTH] = far
+    return bits_of((far < r2) & small)
 
 
 @with_twin(_neighbours8)
@@ -74,16 +62,16 @@ def neighbours8(typingctx, block, p, n, steepness, r2, ceiling, squared):
 
     def codegen(context, builder, sig, args):
         block, p, n, steepness, r2, ceiling, out = args
-        counted, small = _built(builder, block, p, n, steepness, ceiling)
-        builder.store(counted, builder.bitcast(out, VECTOR.as_pointer())).align = 4
-        return _bits(builder, builder.and_(builder.fcmp_ordered("<", counted, splat(builder, r2)), small))
+        far, small = _built(builder, block, p, n, steepness, ceiling)
+        builder.store(far, builder.bitcast(out, VECTOR.as_pointer())).align = 4
+        return _bits(builder, builder.and_(builder.fcmp_ordered("<", far, splat(builder, r2)), small))
 
     return signature, codegen
 
 
 def _distances8(block, p, n, steepness, ceiling, into):
-    counted, small = _plainly(block, p, n, steepness, ceiling)
-    at_address(into, WIDTH, np.float32)[:] = np.where(small, counted, np.float32(np.inf))
+    far, small = _plainly(block, p, n, steepness, ceiling)
+    at_address(into, WIDTH, np.float32)[:] = np.where(small, far, np.float32(np.inf))
 
 
 @with_twin(_distances8)
@@ -95,10 +83,10 @@ def distances8(typingctx, block, p, n, steepness, ceiling, into):
 
     def codegen(context, builder, sig, args):
         block, p, n, steepness, ceiling, into = args
-        counted, small = _built(builder, block, p, n, steepness, ceiling)
-        far = splat(builder, ir.Constant(F32, float("inf")))
+        far, small = _built(builder, block, p, n, steepness, ceiling)
+        nowhere = splat(builder, ir.Constant(F32, float("inf")))
         place = builder.inttoptr(into, VECTOR.as_pointer())
-        builder.store(builder.select(small, counted, far), place).align = 4
+        builder.store(builder.select(small, far, nowhere), place).align = 4
         return context.get_dummy_value()
 
     return signature, codegen

@@ -7,7 +7,7 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 
-from pmviewer.kernels.compile.jit import kernel
+from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.memory import at_address, with_twin
 from pmviewer.maps.photon_words import decode_powers
 
@@ -45,15 +45,21 @@ def add_share(typingctx, address, row, red, green, blue):
     return signature, codegen
 
 
+@device
+def share_of(words, i, count):
+    """Red, green and blue, float64, of one of `count` equal parts of photon i's power."""
+    red, green, blue = decode_powers(words[i, 4], words[i, 5])
+    share = _f8(1.0) / _f8(count)
+    return _f8(red) * share, _f8(green) * share, _f8(blue) * share
+
+
 @kernel
 def hand_out(words, counts, neighbours, powers):
-    """The powers of photons (n, 6) uint32 `words` to equal parts to the first counts[j] of neighbours[j], (n, k) int32
-    numbers of rows of powers (m, ROW) float64; photons without any keep theirs."""
+    """The power of each of photons (n, 6) uint32 `words`, in equal parts, to the first counts[j] of neighbours[j],
+    (n, k) int32 numbers of rows of powers (m, ROW) float64; photons without any keep theirs."""
     sums = powers.ctypes.data
     for j in range(len(counts)):
         if counts[j] > 0:
-            red, green, blue = decode_powers(words[j, 4], words[j, 5])
-            share = _f8(1.0) / _f8(counts[j])
-            r, g, b = _f8(red) * share, _f8(green) * share, _f8(blue) * share
+            r, g, b = share_of(words, j, counts[j])
             for k in range(counts[j]):
                 add_share(sums, _i8(neighbours[j, k]), r, g, b)

@@ -16,11 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import device, kernel
-from pmviewer.kernels.memory import (
-    load_f4,
-    stack_get_i8,
-    stack_i4,
-)
+from pmviewer.kernels.memory import load_f4, stack_get_i8, stack_i4
 from pmviewer.maps.importance.importance_map import IMPORTON_DTYPE, ImportanceMap
 from pmviewer.maps.importance.look_up import STEEPNESS
 from pmviewer.maps.importance.reached import BOXES, ReachedBoxes, reached_boxes

@@ -41,6 +41,24 @@ def squared_distance(tree, i, p, n, steepness):
 
 
 @device
+def nearest_in_block(tree, j, end, p, n, steepness, best, r2, e2, squared):
+    """The importon nearest to a place p with unit normal n among eight from j on, up to `end`, nearer than sqrt(r2), or
+    as far but nearer than sqrt(e2) in space, and both squares; `best` and these without one. squared: 16 int32 of
+    scratch."""
+    mask = nearer8(tree.x + 4 * j, tree.y + 4 * j, tree.z + 4 * j, p, n, steepness, r2, e2, squared)
+    if end - j < WIDTH:
+        mask &= _i4((1 << (end - j)) - 1)
+    while mask != 0:
+        lane = count_trailing_zeros(mask)
+        mask &= mask - _i4(1)
+        d2, e = stack_get_f4(squared, lane), stack_get_f4(squared, WIDTH + lane)
+        if d2 < r2 or (d2 == r2 and e < e2):
+            if arrives(tree, j + lane, n, _i4(ALL_CLASSES)):
+                r2, e2, best = d2, e, j + lane
+    return best, r2, e2
+
+
+@device
 def nearest_one(tree, p, n, steepness, start, best, r2, e2):
     """The importon nearest to a finite place p with unit normal n, closer than sqrt(r2), and its squared distance;
     `best` and r2 without one. tree: record of an importance map, not empty; steepness: weight of the squared height
@@ -66,16 +84,10 @@ def nearest_one(tree, p, n, steepness, start, best, r2, e2):
             node = near
         j, end = (tree.n * (node - leaves)) >> tree.depth, (tree.n * (node - leaves + 1)) >> tree.depth
         while j < end:
-            mask = nearer8(tree.x + 4 * j, tree.y + 4 * j, tree.z + 4 * j, p, n, steepness, r2, e2, squared)
-            if end - j < WIDTH:
-                mask &= _i4((1 << (end - j)) - 1)
-            while mask != 0:
-                lane = count_trailing_zeros(mask)
-                mask &= mask - _i4(1)
-                d2, e = stack_get_f4(squared, lane), stack_get_f4(squared, WIDTH + lane)
-                if d2 < r2 or (d2 == r2 and e < e2):
-                    if arrives(tree, j + lane, n, _i4(ALL_CLASSES)):
-                        r2, e2, best, found = d2, e, j + lane, node
+            before = best
+            best, r2, e2 = nearest_in_block(tree, j, end, p, n, steepness, best, r2, e2, squared)
+            if best != before:
+                found = node
             j += WIDTH
         node = _i8(0)
         while waiting > 0 and node == 0:

@@ -12,7 +12,6 @@ import numpy as np
 
 from pmviewer.kernels.compile.jit import device, kernel
 from pmviewer.kernels.memory import (
-    count_trailing_zeros,
     load_f4,
     load_i4,
     stack_get_f4,
@@ -24,10 +23,9 @@ from pmviewer.kernels.memory import (
 from pmviewer.kernels.vector import normalize
 from pmviewer.maps.importance.facets import MOST, faces, farness, reached_at
 from pmviewer.maps.importance.look_up import STEEPNESS
-from pmviewer.maps.importance.nearest_one import ROOT, nearest_one, squared_distance
+from pmviewer.maps.importance.nearest_one import ROOT, nearest_in_block, nearest_one, squared_distance
 from pmviewer.maps.photon_words import decode_direction
 from pmviewer.maps.search.simd import WIDTH, nearer8
-from pmviewer.maps.search.stored import ALL_CLASSES, arrives
 
 RUN = 32
 """Places that are looked up together, at most."""
@@ -207,16 +205,7 @@ def _nearest_among(maps, blocks, of_facet, begins, squared, p, n, g, j):
     r2, e2 = squared_distance(maps[g], j, p, n, STEEPNESS)
     for at in range(blocks):
         facet, begin = _i8(stack_get_i4(of_facet, at)), _i8(stack_get_i4(begins, at))
-        tree = maps[facet]
-        x, y, z = tree.x + 4 * begin, tree.y + 4 * begin, tree.z + 4 * begin
-        mask = nearer8(x, y, z, p, n, STEEPNESS, r2, e2, squared)
-        if tree.n - begin < WIDTH:
-            mask &= _i4((1 << (tree.n - begin)) - 1)
-        while mask != 0:
-            lane = count_trailing_zeros(mask)
-            mask &= mask - _i4(1)
-            d2, e = stack_get_f4(squared, lane), stack_get_f4(squared, WIDTH + lane)
-            if d2 < r2 or (d2 == r2 and e < e2):
-                if arrives(tree, begin + lane, n, _i4(ALL_CLASSES)):
-                    r2, e2, g, j = d2, e, facet, begin + lane
+        best, r2, e2 = nearest_in_block(maps[facet], begin, maps[facet].n, p, n, STEEPNESS, _i8(-1), r2, e2, squared)
+        if best >= 0:
+            g, j = facet, best
     return g, j, r2

@@ -59,6 +59,27 @@ def dot_of(builder, a, b):
     return total
 
 
+def counted_of(builder, addresses, p, n, steepness):
+    """Of eight photons at three addresses, the squared distances by which they count at a place with a normal, as
+    `counted` has them, and those in space, in LLVM's builder."""
+    normal = [splat(builder, x) for x in cgutils.unpack_tuple(builder, n, 3)]
+    d = [
+        builder.fsub(load_eight(builder, address), splat(builder, coordinate), flags=FAST)
+        for address, coordinate in zip(addresses, cgutils.unpack_tuple(builder, p, 3))
+    ]
+    total, height = dot_of(builder, d, d), dot_of(builder, d, normal)
+    above = builder.fmul(builder.fmul(height, height, flags=FAST), splat(builder, steepness), flags=FAST)
+    return intrinsic(builder, "maxnum", total, above), total
+
+
+def counted(addresses, p, n, steepness):
+    """In plain Python: squared distances (8,) by which photons at three addresses count at a place p with the unit
+    normal n, the weight of the squared height over the plane there being `steepness`; and those in space."""
+    d = offsets(*addresses, *p)
+    total, height = sum(a * a for a in d), sum(a * c for a, c in zip(d, n))
+    return np.maximum(total, steepness * height * height), total
+
+
 def offsets(x_address, y_address, z_address, x, y, z):
     """In plain Python: of eight points at three addresses from (x, y, z), three float32 (8,)."""
     return [at_address(a, WIDTH, np.float32) - c for a, c in ((x_address, x), (y_address, y), (z_address, z))]
@@ -107,12 +128,10 @@ def within8(typingctx, x_address, y_address, z_address, x, y, z, r2, squared):
 
 
 def _nearer8(x_address, y_address, z_address, p, n, steepness, r2, e2, squared):
-    d = offsets(x_address, y_address, z_address, *p)
-    total, height = sum(a * a for a in d), sum(a * c for a, c in zip(d, n))
-    counted = np.maximum(total, steepness * height * height)
+    far, total = counted((x_address, y_address, z_address), p, n, steepness)
     both = squared.view(np.float32)
-    both[:WIDTH], both[WIDTH : 2 * WIDTH] = counted, total
-    return bits_of((counted < r2) | ((counted == r2) & (total < e2)))
+    both[:WIDTH], both[WIDTH : 2 * WIDTH] = far, total
+    return bits_of((far < r2) | ((far == r2) & (total < e2)))
 
 
 @with_twin(_nearer8)
@@ -138,21 +157,14 @@ def nearer8(typingctx, x_address, y_address, z_address, p, n, steepness, r2, e2,
 
     def codegen(context, builder, sig, args):
         *addresses, p, n, steepness, limit, tie, out = args
-        normal = [splat(builder, x) for x in cgutils.unpack_tuple(builder, n, 3)]
-        d = [
-            builder.fsub(load_eight(builder, address), splat(builder, coordinate), flags=FAST)
-            for address, coordinate in zip(addresses, cgutils.unpack_tuple(builder, p, 3))
-        ]
-        total, height = dot_of(builder, d, d), dot_of(builder, d, normal)
-        above = builder.fmul(builder.fmul(height, height, flags=FAST), splat(builder, steepness), flags=FAST)
-        counted = intrinsic(builder, "maxnum", total, above)
+        far, total = counted_of(builder, addresses, p, n, steepness)
         place = builder.bitcast(out, VECTOR.as_pointer())
-        builder.store(counted, place).align = 4
+        builder.store(far, place).align = 4
         builder.store(total, builder.gep(place, [ir.Constant(I32, 1)])).align = 4
         limits = splat(builder, limit)
-        equal = builder.fcmp_ordered("==", counted, limits)
+        equal = builder.fcmp_ordered("==", far, limits)
         equal = builder.and_(equal, builder.fcmp_ordered("<", total, splat(builder, tie)))
-        mask = builder.or_(builder.fcmp_ordered("<", counted, limits), equal)
+        mask = builder.or_(builder.fcmp_ordered("<", far, limits), equal)
         return builder.zext(builder.bitcast(mask, I8), I32)
 
     return signature, codegen
