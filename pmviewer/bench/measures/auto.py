@@ -55,8 +55,8 @@ CHOSEN = (
 CHOSEN_WAYS = (
     "; what every way of such scenes has, such as caustics of lights alone and photons' roulette, light samples with "
     "several lights, the choice of lights by distance, how noise is taken to fall, how wide radii that wait may be, "
-    "and what photons shown directly have to promise were chosen with these scenes too, and how wide look-ups are where "
-    "photons lie far apart with four of them"
+    "and what photons shown directly have to promise were chosen with these scenes too, and how wide look-ups are "
+    "where photons lie far apart with four of them"
 )
 """CHANNEL_ROULETTE, LIGHTS_CAUSTICS, THICKER and WIDE_RECORDS of `pmviewer.engine.auto.candidates`, SEVERAL of
 `pmviewer.render.direct.samples`, the automatic `direct.choice`, the powers of `pmviewer.engine.auto.model` and
