@@ -37,6 +37,8 @@ PASSES, QUICK_PASSES, SKIPPED = 12, 8, 4
 """Passes, of which the first are not counted: they fill the stage store and the caches."""
 BLOCK = 4
 """Passes that are clocked together: a part of each is done during the one before."""
+TURNS, QUICK_TURNS = 5, 2
+"""Blocks that are clocked, each after a pass that is not: what has been made ahead of that, nobody waited for."""
 THREADS = (2, 8, 32)
 BETWEEN, RENDERED = "between stages", "camera pass"
 Way = list[list[float]]
@@ -152,20 +154,26 @@ def serial_share(alone: float, together: float, threads: int) -> float:
     return (threads * together / alone - 1) / (threads - 1) if alone > 0 else 0.0
 
 
-def _clocked(opened: OpenScene, settings: Settings, threads: int, passes: int) -> float:
-    """Seconds of a pass, by the clock: those of the quickest BLOCK."""
-    pool = WorkPool(threads)
+def _clocked(opened: OpenScene, settings: Settings, threads: Sequence[int], turns: int) -> list[float]:
+    """Seconds of a pass, by the clock, on so many threads each: those of the quickest BLOCK. They take turns, so that a
+    busy moment of the machine hits them all."""
+    pools = [WorkPool(n) for n in threads]
+    best = [float("inf")] * len(pools)
     try:
-        renderer, best = Renderer(opened, settings, pool, StageStore(0)), float("inf")
-        for _ in range(SKIPPED):
-            renderer.step()
-        for _ in range(0, passes - SKIPPED, BLOCK):
-            start = time.perf_counter()
-            for _ in range(BLOCK):
+        renderers = [Renderer(opened, settings, pool, StageStore(0)) for pool in pools]
+        for renderer in renderers:
+            for _ in range(SKIPPED):
                 renderer.step()
-            best = min(best, (time.perf_counter() - start) / BLOCK)
+        for _ in range(turns):
+            for k, renderer in enumerate(renderers):
+                renderer.step()
+                start = time.perf_counter()
+                for _ in range(BLOCK):
+                    renderer.step()
+                best[k] = min(best[k], (time.perf_counter() - start) / BLOCK)
     finally:
-        pool.close()
+        for pool in pools:
+            pool.close()
     return best
 
 
@@ -196,7 +204,7 @@ def run(quick: bool = False) -> BenchResult:
     for scene, values in CASES[: 2 if quick else None]:
         opened, settings = open_scene(scene), with_values(Settings(), {**SIZE, **values})
         watched = {n: _watched(opened, settings, n, passes) for n in THREADS}
-        one, two = (_clocked(opened, settings, threads, passes) for threads in (1, 2))
+        one, two = _clocked(opened, settings, (1, 2), QUICK_TURNS if quick else TURNS)
         name = f"{scene}, {settings.render.method}{', cache' if settings.gather.cache == 'on' else ''}"
         alone = {n: sum(stage.alone for stage in stages.values()) for n, (stages, _) in watched.items()}
         times = {n: seconds for n, (_, seconds) in watched.items()}
