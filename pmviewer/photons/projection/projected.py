@@ -14,6 +14,8 @@ PLACES      directional lights                   cells of the disc that photons 
 WORLD       spheres, cylinders, meshes           cells of directions in the world; a photon is kept with the
                                                  cosine to the light's normal as probability, c = 4·(share on)
 DISC        environments                         the disc, to one around what is to be met
+SCALES      environments, directional lights     nothing, c = 1; photons start more densely near what is
+                                                 small on a wide floor (`pmviewer.photons.projection.scales`)
 ==========  ===================================  ==========================================================
 """
 
@@ -38,8 +40,9 @@ from pmviewer.kernels.warp import square_to_disk, square_to_sphere
 from pmviewer.maps.variant import ABSENT
 from pmviewer.photons.emission.scattered import emit_scattered
 from pmviewer.photons.emission.stratified import emit_stratified
+from pmviewer.photons.projection.scales import start_at_scales
 
-WHOLE, DIRECTIONS, PLACES, WORLD, DISC = range(5)
+WHOLE, DIRECTIONS, PLACES, WORLD, DISC, SCALES = range(6)
 ROWS, COLUMNS = 64, 64
 
 NO_PROJECTION = np.repeat(ABSENT, 2)
@@ -55,6 +58,11 @@ PROJECTION_DTYPE = np.dtype(
         ("center_y", "f4"),
         ("center_z", "f4"),
         ("radius", "f4"),
+        ("small_x", "f4"),  # of a sphere around what is small on a wide floor
+        ("small_y", "f4"),
+        ("small_z", "f4"),
+        ("small_radius", "f4"),
+        ("scales", "i8"),  # discs around it
     ],
     align=True,
 )
@@ -137,8 +145,11 @@ def emission(scene, projection, i, sequence, seed, index, u_pick, position, dire
         mode = load_i4(projection.modes, light)
         first = _i8(load_i4(projection.first, light))
         count = _i8(load_i4(projection.first, light + 1)) - first
-        if mode in (WHOLE, DISC):
+        if mode in (WHOLE, DISC, SCALES):
             p, d, beta = emit_from(scene, light, position, direction)
+            if mode == SCALES:
+                p, factor = start_at_scales(scene, projection, d, position)
+                return p, d, beta, light, factor > _f4(0.0), factor
             if mode == DISC:
                 p = _on_disc(scene, projection, d, position)
             return p, d, beta, light, True, _f4(1.0)

@@ -16,13 +16,14 @@ belongs to a cell that is on.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels import scene as K
 from pmviewer.photons.projection.bounds import enclosing, spheres_of
+from pmviewer.photons.projection.focus import Focus, focus_of
 from pmviewer.photons.projection.projected import (
     COLUMNS,
     DIRECTIONS,
@@ -30,9 +31,11 @@ from pmviewer.photons.projection.projected import (
     PLACES,
     PROJECTION_DTYPE,
     ROWS,
+    SCALES,
     WHOLE,
     WORLD,
 )
+from pmviewer.photons.projection.scales import gain, scales
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.scene.arrays.texture_coordinates import orthonormal
 from pmviewer.scene.description import LUMINANCE, DirectionalLight, Environment, PointLight, ProjectorLight, SpotLight
@@ -41,7 +44,14 @@ from pmviewer.scene.emission import spot_solid_angle
 Float = NDArray[np.float64]
 SLACK = 1e-4
 """Radians; also of the scene's size."""
-MODES = {WHOLE: "whole", DIRECTIONS: "directions", PLACES: "places", WORLD: "world directions", DISC: "disc"}
+MODES = {
+    WHOLE: "whole",
+    DIRECTIONS: "directions",
+    PLACES: "places",
+    WORLD: "world directions",
+    DISC: "disc",
+    SCALES: "scales",
+}
 WORTHWHILE = 0.7
 """`auto` uses maps that cover less than this share of the power."""
 
@@ -53,7 +63,7 @@ class ProjectionMap:
     `on` (ROWS, COLUMNS) bool: rows are polar angles (or radii) with edges `edges` (ROWS + 1,) in radians (or scene
     units), columns azimuths from 0 to 2π in the frame `axes` (3, 3), whose rows are the two axes across and the axis
     θ = 0 (or the direction of light). `origin` is the light's middle, or the disc's. `share` is the covered share of
-    the light's power. Without cells (modes "whole" and "disc") all of `on` is True.
+    the light's power. Without cells (modes "whole", "disc" and "scales") all of `on` is True.
     """
 
     light: str
@@ -98,15 +108,16 @@ def projection_of(scene: FlatScene, always: bool = True, with_caustics: bool = T
     arrays: list[NDArray] = []
     charted: list[tuple[tuple[ProjectionMap, ...], float]] = []
     total = scene.total_luminance
+    small = focus_of(scene.owner, scene.radius) if any(map(_is_distant, scene.owner.lights)) else None
     for record, for_caustics in zip(records, (False, True), strict=True):
         spheres = spheres_of(scene.owner, for_caustics)
         if with_caustics or not for_caustics:
-            maps = [_map_of(scene, light, spheres) for light in range(len(scene.light_names))]
+            maps = [_map_or_scales(scene, light, spheres, small) for light in range(len(scene.light_names))]
         else:
             maps = [_whole(scene, light) for light in range(len(scene.light_names))]
         powers = scene.light_power @ LUMINANCE * [c for _, c in maps]
         if not always and powers.sum() > WORTHWHILE * total:
-            maps = [_whole(scene, light) for light in range(len(maps))]
+            maps = [old if old[0].mode == MODES[SCALES] else _whole(scene, i) for i, old in enumerate(maps)]
             powers = scene.light_power @ LUMINANCE
         cells = [np.flatnonzero(m.on) if m.mode in _CELLED else np.zeros(0, np.int64) for m, _ in maps]
         mode_of = {name: mode for mode, name in MODES.items()}
@@ -123,6 +134,9 @@ def projection_of(scene: FlatScene, always: bool = True, with_caustics: bool = T
             center, radius = enclosing(spheres)
             record["center_x"], record["center_y"], record["center_z"] = center
             record["radius"] = radius + _slack(scene)
+        if small is not None:
+            record["small_x"], record["small_y"], record["small_z"] = small.center
+            record["small_radius"], record["scales"] = small.radius, scales(small.radius, scene.radius)
         charted.append((tuple(m for m, _ in maps), float(powers.sum())))
     (surfaces, surface_power), (caustic, caustic_power) = charted
     return Projection(records, tuple(arrays), surfaces, caustic, surface_power, caustic_power)
@@ -140,6 +154,21 @@ def _whole(scene: FlatScene, light: int) -> tuple[ProjectionMap, float]:
     on = np.ones((ROWS, COLUMNS), np.bool_)
     edges = np.linspace(0, math.pi, ROWS + 1)
     return ProjectionMap(scene.light_names[light], MODES[WHOLE], on, edges, np.eye(3), scene.center, 1.0), 1.0
+
+
+def _is_distant(light: object) -> bool:
+    return isinstance(light, Environment | DirectionalLight)
+
+
+def _map_or_scales(scene: FlatScene, light: int, spheres: Float, small: Focus | None) -> tuple[ProjectionMap, float]:
+    """Of light from outside, what makes photons denser at what is small: the map, or more of them near it."""
+    found = _map_of(scene, light, spheres)
+    if small is None or not found[1] > 0 or not _is_distant(_described(scene, light)):
+        return found
+    if gain(small.radius, scene.radius) * found[1] <= 1:
+        return found
+    whole, _ = _whole(scene, light)
+    return replace(whole, mode=MODES[SCALES], origin=small.center), 1.0
 
 
 def _map_of(scene: FlatScene, light: int, spheres: Float) -> tuple[ProjectionMap, float]:

@@ -114,7 +114,8 @@ class Photons(Group):
     projection: Literal["auto", "on", "off"] = setting(
         "auto",
         "Projection maps: photons start only where they can meet a surface, and those for the caustic map alone (q "
-        "below 1) only where they can meet mirrors or glass. auto: where that spares at least a third of them.",
+        "below 1) only where they can meet mirrors or glass. auto: where that spares at least a third of them. Light "
+        "from outside starts more densely near what stands on a wide floor.",
         stage="photons",
         scale="choice",
         title="projection maps",
