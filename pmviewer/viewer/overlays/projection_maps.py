@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 DIRECTIONS = ("directions", "world directions")
 PLACES = ("places",)
+SCALES = "scales"
 _CORNERS = np.array([(0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)])
 
 
@@ -68,8 +69,8 @@ class ProjectionMaps(Overlay):
         self._array: moderngl.VertexArray | None = None
         self._lights: tuple[tuple[int, str, float], ...] = ()
         """Number, name and share of the power that is covered, of the lights that are drawn."""
-        self._other_lights = 0
-        """Lights whose photons start anywhere."""
+        self._other_lights, self._denser = 0, 0
+        """Lights without cells; of these, those whose photons start more densely near what stands on a wide floor."""
 
     def needs(self, source: Source) -> Needs | None:
         style: ProjectionOverlay = self.style(source.settings)
@@ -82,6 +83,7 @@ class ProjectionMaps(Overlay):
         shown = [(number, cells) for number, cells in enumerate(maps) if is_drawn(cells)]
         self._lights = tuple((number, cells.light, cells.share) for number, cells in shown)
         self._other_lights = len(maps) - len(shown)
+        self._denser = sum(cells.mode == SCALES for cells in maps)
         if shown:
             vertices = [cell_vertices(cells, radius, light_colour(number)) for number, cells in shown]
             self._buffer = self.shaders.context.buffer(np.concatenate(vertices))
@@ -94,7 +96,7 @@ class ProjectionMaps(Overlay):
         if self._buffer is not None:
             self._buffer.release()
         self._array = self._buffer = None
-        self._lights, self._other_lights = (), 0
+        self._lights, self._other_lights, self._denser = (), 0, 0
 
     def draw_over(self, drawing: Drawing, settings: Settings) -> None:
         if self._array is None:
@@ -108,6 +110,7 @@ class ProjectionMaps(Overlay):
         if len(self._lights) > MOST_SWATCHES:
             imgui.text_disabled(f"and {len(self._lights) - MOST_SWATCHES} more")
         if self._other_lights:
-            wrapped(f"Lights without cells: {grouped(self._other_lights)}. Their photons start anywhere.")
+            said = f"Lights without cells: {grouped(self._other_lights)}. Their photons start anywhere"
+            wrapped(said + (", more of them near what stands on the floor." if self._denser else "."))
         elif not self._lights:
             wrapped("No maps: they would spare too little here (photons.projection = on makes them).")
