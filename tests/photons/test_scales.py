@@ -15,9 +15,9 @@ from pmviewer.engine.stages.projection import projection_for
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.maps.record import unpack
 from pmviewer.photons.light_pass.light_pass import trace_pass
-from pmviewer.photons.projection.focus import focus_of
 from pmviewer.photons.projection.projection import projection_of
 from pmviewer.photons.projection.scales import gain, scales, start_at_scales
+from pmviewer.photons.projection.small import small_of
 from pmviewer.scene.arrays.flatten import LUMINANCE, bounding_sphere, flatten
 from pmviewer.scene.description import (
     Camera,
@@ -66,14 +66,14 @@ def yard(floor="sheet", lights=(SKY,), size=24) -> Scene:
 @pytest.mark.parametrize("floor", list(FLOORS))
 def test_what_stands_on_a_floor_is_found(floor):
     scene = yard(floor)
-    found = focus_of(scene, bounding_sphere(scene)[1])
+    found = small_of(scene, bounding_sphere(scene)[1])
     assert found is not None
     np.testing.assert_allclose(found.center, (3.0, 0.3, 3.5), atol=1e-9)
     assert found.radius == pytest.approx(math.sqrt(1 + 1 + 0.36) / 2)
 
 
 def small(scene):
-    return focus_of(scene, bounding_sphere(scene)[1])
+    return small_of(scene, bounding_sphere(scene)[1])
 
 
 def test_rooms_and_landscapes_hold_nothing_small():

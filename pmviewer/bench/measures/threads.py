@@ -226,7 +226,9 @@ def run(quick: bool = False) -> BenchResult:
     columns = ["case", "stage", "CPU ms a pass", *(f"serial on {n}" for n in THREADS), "clock, 2 threads"]
     notes = [
         "512×512; a stage's serial share is of the whole pass, with nothing beside it; in a pass the stages before the "
-        "camera pass run beside that of the pass before; clocks need a machine that does nothing else",
+        "camera pass run beside that of the pass before; clocks are those of the quickest "
+        f"of {QUICK_TURNS if quick else TURNS} blocks of {BLOCK} passes, one thread and two in "
+        "turn, and need a machine that does nothing else",
         "serial on n: what a pass on n threads that nothing else uses takes longer than 1/n, by each task's CPU time",
     ]
     return BenchResult("Threads", columns, rows, targets, notes)

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from pmviewer.kernels import scene as K
 from pmviewer.photons.projection.bounds import enclosing, spheres_of
 from pmviewer.photons.projection.cells import SLACK, cells_of_directions, cells_of_places
-from pmviewer.photons.projection.focus import Focus, focus_of
 from pmviewer.photons.projection.projected import (
     COLUMNS,
     DIRECTIONS,
@@ -27,6 +26,7 @@ from pmviewer.photons.projection.projected import (
     WORLD,
 )
 from pmviewer.photons.projection.scales import gain, scales
+from pmviewer.photons.projection.small import Small, small_of
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.scene.arrays.texture_coordinates import orthonormal
 from pmviewer.scene.description import LUMINANCE, DirectionalLight, Environment, PointLight, ProjectorLight, SpotLight
@@ -97,7 +97,7 @@ def projection_of(scene: FlatScene, always: bool = True, with_caustics: bool = T
     arrays: list[NDArray] = []
     charted: list[tuple[tuple[ProjectionMap, ...], float]] = []
     total = scene.total_luminance
-    small = focus_of(scene.owner, scene.radius) if any(map(_is_distant, scene.owner.lights)) else None
+    small = small_of(scene.owner, scene.radius) if any(map(_is_distant, scene.owner.lights)) else None
     for record, for_caustics in zip(records, (False, True), strict=True):
         spheres = spheres_of(scene.owner, for_caustics)
         if with_caustics or not for_caustics:
@@ -149,7 +149,7 @@ def _is_distant(light: object) -> bool:
     return isinstance(light, Environment | DirectionalLight)
 
 
-def _map_or_scales(scene: FlatScene, light: int, spheres: Float, small: Focus | None) -> tuple[ProjectionMap, float]:
+def _map_or_scales(scene: FlatScene, light: int, spheres: Float, small: Small | None) -> tuple[ProjectionMap, float]:
     """Of light from outside, what makes photons denser at what is small: the map, or more of them near it."""
     found = _map_of(scene, light, spheres)
     if small is None or not found[1] > 0 or not _is_distant(_described(scene, light)):

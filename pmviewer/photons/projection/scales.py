@@ -1,7 +1,7 @@
 """Photons of light from outside that start the more densely, the nearer they pass by what is small on a wide floor.
 
 On the disc across the light's direction that the scene fills, of radius R, lie discs of the radii r, 2r, 4r … < R
-around the middle of what is small (`pmviewer.photons.projection.focus`). A share EVERYWHERE of the photons starts
+around the middle of what is small (`pmviewer.photons.projection.small`). A share EVERYWHERE of the photons starts
 anywhere, the others within one of the discs, all of which have as many. The density, over that of photons that start
 anywhere, is m = EVERYWHERE + (1 − EVERYWHERE)/n · Σ (R/r_k)² over the discs that a place lies in; a photon has 1/m of
 the usual power. Nothing is biased whatever is taken for small, and no photon has more than 1/EVERYWHERE times that.

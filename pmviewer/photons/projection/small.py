@@ -27,35 +27,34 @@ SMALL = 0.5
 """Most radius of what stands there, relative to the scene's."""
 
 
-class Focus(NamedTuple):
+class Small(NamedTuple):
     """A sphere around all but the floor."""
 
     center: Float
     radius: float
 
 
-def focus_of(scene: Scene, radius: float) -> Focus | None:
+def small_of(scene: Scene, radius: float) -> Small | None:
     """What stands on a scene's floor, the scene having that bounding sphere; None where it has no floor, or that
     reaches little farther."""
     wide = 2 * WIDE * radius
     lows, highs, normals, grounds = [], [], [], []
     for shape in scene.shapes:
-        if isinstance(shape.geometry, Mesh):
-            corners = shape.geometry.vertices[shape.geometry.faces].astype(float)
-            low, high = corners.min(axis=1), corners.max(axis=1)
-            large = np.linalg.norm(high - low, axis=1) > wide
-            normals.append(_normals_of(corners[large]))
-            low, high = low[~large], high[~large]
-        else:
-            low, high = (np.array(corner, float)[None] for corner in shape_bounds(shape))
-            if np.linalg.norm(high - low) > wide:
-                low = high = np.zeros((0, 3))
-                if isinstance(shape.geometry, Sphere):
-                    grounds.append(np.array(shape.geometry.center, float))
-                elif (normal := _normal_of(shape.geometry)) is not None:
-                    normals.append(normal)
-                else:
-                    return None
+        low, high = (np.array(corner, float)[None] for corner in shape_bounds(shape))
+        if np.linalg.norm(high - low) > wide:
+            low = high = np.zeros((0, 3))
+            if isinstance(shape.geometry, Mesh):
+                corners = shape.geometry.vertices[shape.geometry.faces].astype(float)
+                low, high = corners.min(axis=1), corners.max(axis=1)
+                large = np.linalg.norm(high - low, axis=1) > wide
+                normals.append(_normals_of(corners[large]))
+                low, high = low[~large], high[~large]
+            elif isinstance(shape.geometry, Sphere):
+                grounds.append(np.array(shape.geometry.center, float))
+            elif (normal := _normal_of(shape.geometry)) is not None:
+                normals.append(normal)
+            else:
+                return None
         lows.append(low)
         highs.append(high)
     if scene.instances:
@@ -71,7 +70,7 @@ def focus_of(scene: Scene, radius: float) -> Focus | None:
     every = every / np.maximum(np.linalg.norm(every, axis=1, keepdims=True), 1e-300)
     if not 0 < around <= SMALL * radius or not np.all(np.abs(every @ every[0]) >= LEVEL):
         return None
-    return Focus(center, around)
+    return Small(center, around)
 
 
 def _normals_of(corners: Float) -> Float:
