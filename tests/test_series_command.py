@@ -8,6 +8,7 @@ import pytest
 from pmviewer.commands.cli import main
 from pmviewer.commands.series_plan import load_keys, plan_series, varied, way_of
 from pmviewer.engine.series.keys import automatic_radius
+from pmviewer.engine.store import StageStore
 from pmviewer.errors import SettingError
 from pmviewer.output.png import read_png
 from pmviewer.settings.access import Settings
@@ -130,7 +131,8 @@ def test_a_film_has_one_radius():
     """An automatic one follows the camera in steps; a film that comes nearer keeps one between them."""
     plan = plan_of("camera.fov=20..60", pictures=5, size="400x400")
     (radius,) = {one.estimate.radius for one in plan.pictures}
-    alone = [automatic_radius(plan.opened, one) for one in plan.pictures]
+    store = StageStore()
+    alone = [automatic_radius(plan.opened, one, store).global_ for one in plan.pictures]
     assert len(set(alone)) > 1
     assert min(alone) < radius < max(alone)
     assert {one.estimate.radius for one in plan_of("photons.N=1..100").pictures} == {"auto"}

@@ -7,6 +7,7 @@ from typing import Any
 
 from pmviewer.engine.diagnose import Looked
 from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.radius import FirstRadii
 from pmviewer.engine.stages.pass_data import RenderedPass
 from pmviewer.engine.stages.radiance_photons import AUTOMATIC_CUTOFF, AUTOMATIC_CUTOFF_NEAREST
 from pmviewer.maps.search.grid import PhotonGrid
@@ -14,15 +15,16 @@ from pmviewer.photons.bounces import most_bounces
 from pmviewer.settings.access import Settings
 
 
-def automatic_values(looked: Looked, first_radius: float) -> dict[str, Any]:
+def automatic_values(looked: Looked, first: FirstRadii) -> dict[str, Any]:
     """By the full names of settings, whether or not they are automatic now; what isn't used is left out.
 
-    first_radius: of look-ups in the first pass, in scene units; it stays the same from pass to pass.
+    first: radii of the first pass, in scene units; they stay the same from pass to pass.
     """
     plan, settings, radius = looked.plan, looked.settings, looked.scene.flat.radius
     found: dict[str, Any] = {"light.rig": _rig(looked.scene), "render.lights": "hidden" if plan.hides else "shown"}
     if plan.photons:
-        found["estimate.radius"] = first_radius / radius
+        found["estimate.radius"] = first.global_ / radius
+        found["estimate.caustic_radius"] = first.caustic / first.global_
         found["photons.max_bounces"] = most_bounces(settings.photons, plan.media)
         found["photons.projection"] = "off" if looked.light.tracer.projection is None else "on"
     if not plan.path:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import astuple, dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.maps.estimate.nearest import shrunk
@@ -19,32 +21,74 @@ FOOTPRINTS, GATHER_FOOTPRINTS = 4.0, 3.0
 """Radius in pixel footprints: maps shown directly need a calm estimate; gather rays average it anyway, so that theirs
 can be sharper and darken corners less."""
 PROBES = 24
+STEPS = 4
+"""Automatic radii in each doubling: they are rounded, so that a small camera move keeps the maps of the view before."""
 
 
-def typical_distance(scene: FlatScene, camera: CameraPose) -> float:
-    """Median distance from the eye to what it sees; the scene's radius where it sees nothing."""
-    u = (np.arange(PROBES) + 0.5) / PROBES
+@dataclass(frozen=True)
+class FirstRadii:
+    """Of look-ups in the first pass, in scene units or relative to the scene: in the `global_` map and the `caustic`
+    one, and the `usual` one, by pixels alone, which those in media go with."""
+
+    usual: float
+    global_: float
+    caustic: float
+
+    def scaled(self, factor: float) -> FirstRadii:
+        """All of them so many times as wide."""
+        return FirstRadii(*(factor * radius for radius in astuple(self)))
+
+    def values(self, estimate: Estimate) -> dict[str, float]:
+        """The settings that stand for these radii, which are relative to the scene, as numbers; `estimate` has what
+        media have."""
+        found = {
+            "estimate.radius": min(max(self.global_, 1e-7), 10.0),
+            "estimate.caustic_radius": min(max(self.caustic / self.global_, 0.005), 100.0),
+        }
+        if self.usual != self.global_:
+            found["estimate.volume_radius"] = max(estimate.volume_radius * self.usual / self.global_, 0.01)
+        return found
+
+
+NO_RADII = FirstRadii(0.0, 0.0, 0.0)
+
+
+def rounded(radius: float) -> float:
+    """To the steps of automatic radii."""
+    return float(2.0 ** (round(STEPS * math.log2(radius)) / STEPS))
+
+
+def seen_from(
+    scene: FlatScene, camera: CameraPose, probes: int
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
+    """What rays through so many places along each side of the picture meet: origins and directions (n, 3), distances
+    and primitives (n,) of those that meet something."""
+    u = (np.arange(probes) + 0.5) / probes
     x, y = (g.reshape(-1) for g in np.meshgrid(u * camera.width, u * camera.height))
     origins, directions = (np.ascontiguousarray(part, np.float32) for part in camera.rays(x, y))
     n = len(directions)
     tmin, tmax = np.zeros(n, np.float32), np.full(n, np.inf, np.float32)
     t, prim, uv = np.empty(n, np.float32), np.empty(n, np.int32), np.empty((n, 2), np.float32)
     cast_closest(scene.record[0], origins, directions, tmin, tmax, t, prim, uv)
-    hits = t[prim >= 0]
+    met = prim >= 0
+    return origins[met], directions[met], t[met], prim[met]
+
+
+def typical_distance(scene: FlatScene, camera: CameraPose) -> float:
+    """Median distance from the eye to what it sees; the scene's radius where it sees nothing."""
+    _, _, hits, _ = seen_from(scene, camera, PROBES)
     return float(np.median(hits)) if len(hits) else scene.radius
 
 
 def first_radius(scene: FlatScene, camera: CameraPose, estimate: Estimate, gather: bool) -> float:
-    """Radius of pass 0 in scene units, with a final gather or without.
-
-    The automatic one is rounded to steps of 2^¼, so that a small camera move keeps the maps of the previous view.
-    """
+    """Radius of pass 0 in scene units, with a final gather or without. The automatic one goes with the pixels
+    alone (`pmviewer.engine.stages.spread` has what follows from the photons)."""
     if estimate.radius != "auto":
         return float(estimate.radius) * scene.radius
     footprint = camera.pixel_size() or typical_distance(scene, camera) * camera.pixel_angle()
     wanted = (GATHER_FOOTPRINTS if gather else FOOTPRINTS) * footprint / scene.radius
     wanted = min(max(wanted, 1e-4), 0.1)
-    return 2.0 ** (round(4 * math.log2(wanted)) / 4) * scene.radius
+    return rounded(wanted) * scene.radius
 
 
 def _shrunk(index: int, estimate: Estimate) -> float:

@@ -29,13 +29,14 @@ from pmviewer.engine.memory import check_memory
 from pmviewer.engine.method import Plan, plan_of, radii_of_pixels
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
-from pmviewer.engine.radius import first_radius
+from pmviewer.engine.radius import NO_RADII, FirstRadii
 from pmviewer.engine.stages.eye import gather_rays_of, marks_of, render_into
 from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.engine.stages.light import LightStage
 from pmviewer.engine.stages.pass_data import RenderedPass
 from pmviewer.engine.stages.pass_maps import Carried
 from pmviewer.engine.stages.pass_stages import MadeAhead, PassStages
+from pmviewer.engine.stages.spread import radii_of_first_pass
 from pmviewer.engine.stages.virtual_lights import film_of
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
@@ -84,9 +85,11 @@ class Renderer:
         store: StageStore,
         version: int = 0,
         plan: Plan | None = None,
+        first: FirstRadii | None = None,
     ) -> None:
-        """plan: what runs, where that is not what settings and scene ask for. Raises SettingError when the camera is
-        impossible or the image can't fit into memory."""
+        """plan: what runs, where that is not what settings and scene ask for; first: radii of the first pass, where
+        these are not theirs. Raises SettingError when the camera is impossible or the image can't fit into memory,
+        Cancelled when the pool is cancelled."""
         self.scene, self.settings, self.pool, self.store, self.version = scene, settings, pool, store, version
         render_camera = resolve_camera(scene.scene, settings.camera)
         bounds = scene.flat.center, scene.flat.radius
@@ -102,15 +105,14 @@ class Renderer:
             self.film.moments = Moments(len(self.film.sums), self.film.refined)
         self.error = ErrorEstimate(self.camera.width, self.camera.height, settings, self.plan)
         self.error.bias = scene.biases.get(way_of(settings)) if scene.biases else None
-        radius = (
-            first_radius(scene.flat, self.render_camera, settings.estimate, self.plan.gather)
-            if self.plan.photons
-            else 0.0
-        )
-        self.settled_radius = radius
-        """Of the film's first pass; the first radius of a coarse picture is larger."""
         self.tally = Tally()
-        self._stages = PassStages(scene, settings, self.plan, self.render_camera, radius, pool, store, self.tally)
+        radii = first or NO_RADII
+        if self.plan.photons and first is None:
+            asked = scene, settings, self.plan, self.render_camera, pool.run, store
+            radii = self.tally.timed(pool, "light pass", lambda: radii_of_first_pass(*asked))
+        self.settled_radii = radii
+        """Of the film's first pass; those of a coarse picture are larger."""
+        self._stages = PassStages(scene, settings, self.plan, self.render_camera, radii, pool, store, self.tally)
         self._next: MadeAhead | None = None
         self.latest: RenderedPass | None = None
         self.coarse_pass: RenderedPass | None = None
@@ -122,8 +124,8 @@ class Renderer:
 
     @property
     def first_radius(self) -> float:
-        """Of look-ups in the first pass, in scene units; 0 without photons."""
-        return self._stages.first_radius
+        """Of look-ups in the global map in the first pass, in scene units; 0 without photons."""
+        return self._stages.first.global_
 
     @property
     def light(self) -> LightStage:
@@ -280,9 +282,9 @@ class Renderer:
         small = CameraPose(**{**pose.__dict__, "width": -(-pose.width // shrink), "height": -(-pose.height // shrink)})
         film = film_of(self.settings, self.plan, small.width, small.height)
         N = min(self.settings.photons.N, COARSE_PHOTONS)
-        quick = Renderer(self.scene, self.settings, self.pool, self.store, self.version, self.plan)
-        quick.settled_radius = self.first_radius
-        quick._stages.first_radius = self.first_radius * min(2.0, (self.settings.photons.N / N) ** 0.25)
+        first = self.settled_radii.scaled(min(2.0, (self.settings.photons.N / N) ** 0.25))
+        quick = Renderer(self.scene, self.settings, self.pool, self.store, self.version, self.plan, first)
+        quick.settled_radii = self.settled_radii
         quick._pass(film, small, 0, N)
         self.coarse_pass = quick.latest
         film.passes = 1
@@ -329,7 +331,7 @@ class Renderer:
         )
         return replace(
             made,
-            automatic=automatic_values(looked, self.settled_radius),
+            automatic=automatic_values(looked, self.settled_radii),
             statistics=replace(made.statistics, remaining=None if coarse else self.error.latest),
         )
 
@@ -399,9 +401,9 @@ class Renderer:
         without the rule."""
         if not radii_of_pixels(self.facts):
             return {}
-        estimate = self.settings.estimate
+        estimate, first = self.settings.estimate, self._stages.first
         if film.radii is None:
-            film.radii = first_radii(len(film.sums), estimate.caustic_radius * self.first_radius, self.first_radius)
+            film.radii = first_radii(len(film.sums), first.caustic, first.global_)
         elif not again:
             shrink(film.radii, estimate.alpha, estimate.floor * self.scene.flat.radius)
         caustic, global_ = (float(film.radii[:, RADIUS + which].max()) for which in (OF_CAUSTIC, OF_GLOBAL))

@@ -32,12 +32,15 @@ from pmviewer.engine.auto.model import PHOTONS, Option, error_after, in_time, sa
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.radius import FirstRadii
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.maps.radius import progressive_radius
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import SETTINGS, Settings, flat, with_values
 from pmviewer.state import State
+
+RADII = FirstRadii(0.02, 0.02, 0.01)
 
 PLAIN = SceneTraits(False, True, False, False, 1)
 
@@ -60,7 +63,7 @@ def test_what_traits_rule_out_is_not_tried():
 def test_fewer_photons_than_usual_are_chosen_where_they_promise_a_fifth_less(less, chosen):
     """A trial meets few bright ones: what it says of fewer photons is too good rather than too bad. Of more of them it
     believes a tenth."""
-    measured = Measured(CACHE, Costs(0.1, 0.0), 1.0, radius=0.01)
+    measured = Measured(CACHE, Costs(0.1, 0.0), 1.0, first=RADII)
 
     def option(N: int, error: float) -> Option:
         return Option(measured, Numbers(N), 20.0, error, 10.0)
@@ -78,7 +81,7 @@ def test_ways_without_second_gathers_have_to_promise_a_fifth_less(less, chosen):
     """What they lack near edges, or find behind thin walls, a trial may overlook."""
 
     def option(way: Candidate, error: float) -> Option:
-        return Option(Measured(way, Costs(0.1, 0.0), 1.0, radius=0.01), Numbers(300_000), 20.0, error, 10.0)
+        return Option(Measured(way, Costs(0.1, 0.0), 1.0, first=RADII), Numbers(300_000), 20.0, error, 10.0)
 
     picked = _picked([option(CACHE, less * 1e-3), option(CACHE_CORNERS, 1e-3)], lambda o: o.error)
     assert picked.measured.candidate == chosen
@@ -89,7 +92,7 @@ def test_photons_shown_directly_have_to_promise_less_than_a_gather_for_a_time(le
     """A trial thinks too well of them: where they promised as much as a gather, they never had it."""
 
     def option(way: Candidate, error: float) -> Option:
-        return Option(Measured(way, Costs(0.1, 0.0), 1.0, radius=0.01), Numbers(300_000), 20.0, error, 10.0)
+        return Option(Measured(way, Costs(0.1, 0.0), 1.0, first=RADII), Numbers(300_000), 20.0, error, 10.0)
 
     found = [option(PROGRESSIVE, less * 1e-3), option(CACHE_CORNERS, 1e-3)]
     assert _picked(found, lambda o: o.error, SHOWN).measured.candidate == chosen
@@ -111,7 +114,7 @@ def test_of_gathers_that_promise_about_as_much_the_best_known_is_taken(promised,
     """A quarter more error is nothing beside the bias of records between a trial's few pixels, and of look-ups near
     edges."""
     gather, cache = (
-        Measured(way.having(more), Costs(0.1, 0.0), error, gathered=1e-9, radius=0.01)
+        Measured(way.having(more), Costs(0.1, 0.0), error, gathered=1e-9, first=RADII)
         for way, more, error in zip((GATHER, CACHE), (CORNERS, {}), promised, strict=True)
     )
     assert _by_time(Trial([gather, cache]), 10.0).name == expected.name
@@ -131,7 +134,7 @@ def test_of_gathers_that_promise_about_as_much_the_best_known_is_taken(promised,
 def test_samples_are_adapted_where_there_are_passes_enough(cornell, way, passes, goal, adapted):
     """Those before it is decided are less than a quarter then; whoever gives no goal looks on for longer. On a cluster
     passes do not know of one another."""
-    option = Option(Measured(way, Costs(0.1, 0.0), 1.0, radius=0.01), Numbers(50_000), passes, 1e-3, 10.0)
+    option = Option(Measured(way, Costs(0.1, 0.0), 1.0, first=RADII), Numbers(50_000), passes, 1e-3, 10.0)
     values = _values(option, Settings(), cornell, _adapts(option, goal))
     assert (values.get("render.adaptive") == "on") == adapted
 
@@ -244,10 +247,18 @@ def test_far_beyond_the_passes_that_are_summed_up_means_follow_their_power_law(d
 def test_radii_are_settings():
     """Each width scales its own look-ups alone."""
     settings = Settings()
-    assert Widths().values(settings, 0.02) == {}
-    assert Widths(2.0, 2.0).values(settings, 0.02) == {"estimate.radius": 0.04}
-    assert Widths(caustic=0.5).values(settings, 0.02) == {"estimate.caustic_radius": 0.25}
-    assert Widths(shown=2.0).values(settings, 0.02) == {"estimate.radius": 0.04, "estimate.caustic_radius": 0.25}
+    assert Widths().values(settings, RADII) == {}
+    both = {"estimate.radius": 0.04, "estimate.caustic_radius": 0.5}
+    assert Widths(2.0, 2.0).values(settings, RADII) == both
+    assert Widths(caustic=0.5).values(settings, RADII) == {"estimate.caustic_radius": 0.25}
+    assert Widths(shown=2.0).values(settings, RADII) == both | {"estimate.caustic_radius": 0.25}
+    sparse = FirstRadii(0.02, 0.08, 0.04)
+    assert Widths(caustic=0.5).values(settings, sparse) == {"estimate.caustic_radius": 0.25}
+    media = {"estimate.volume_radius": 0.25}
+    assert Widths(shown=0.5).values(settings, sparse) == media | {
+        "estimate.radius": 0.04,
+        "estimate.caustic_radius": 1.0,
+    }
 
 
 def test_without_time_for_a_trial_traits_choose(cornell):

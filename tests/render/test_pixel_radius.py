@@ -52,7 +52,7 @@ def test_after_the_first_pass_a_pixel_shrinks_if_it_found_anything(opened, pool)
     assert 0.5 < (found[:, OF_GLOBAL] > 0).mean() < 1
     assert 0.02 < (found[:, OF_CAUSTIC] > 0).mean() < 0.9
     renderer.step()
-    first = np.array([renderer.settings.estimate.caustic_radius, 1.0]) * renderer.first_radius
+    first = np.array([0.5, 1.0]) * renderer.first_radius
     expected = first * np.where(found > 0, np.sqrt(renderer.settings.estimate.alpha), 1.0)
     np.testing.assert_allclose(renderer.film.radii[:, :COUNTED], expected, rtol=1e-5)
 

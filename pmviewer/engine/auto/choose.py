@@ -199,7 +199,7 @@ def _values(picked: Option, base: Settings, opened: OpenScene, adapts: bool) -> 
         values |= {"photons.N": numbers.N, "photons.q": numbers.q, "estimate.delay": picked.delay}
     if numbers.samples != 1:
         values["direct.samples"] = numbers.samples * plan_of(with_photons, opened.traits).light_samples
-    values |= numbers.widths.values(with_photons, picked.measured.radius)
+    values |= numbers.widths.values(with_photons, picked.measured.first)
     if adapts:
         adapted = with_values(base, assignments(values | ADAPTIVE))
         if plan_of(adapted, opened.traits).adaptive:

@@ -8,6 +8,7 @@ from typing import Any
 
 from pmviewer.engine.auto.bias import Bias
 from pmviewer.engine.auto.candidates import Candidate
+from pmviewer.engine.radius import NO_RADII, FirstRadii
 from pmviewer.settings.access import Settings
 
 BY_POWER, BY_PHOTONS = 1.3, 1.1
@@ -28,14 +29,17 @@ class Widths:
         """Whether they are the automatic ones."""
         return self.caustic == self.shown == 1.0
 
-    def values(self, settings: Settings, radius: float) -> dict[str, Any]:
-        """The settings that they stand for, where the automatic radius is that, relative to the scene."""
+    def values(self, settings: Settings, first: FirstRadii) -> dict[str, Any]:
+        """The settings that they stand for, where the automatic radii are these, relative to the scene."""
         found: dict[str, Any] = {}
         if self.shown != 1.0:
-            found["estimate.radius"] = float(f"{min(max(radius * self.shown, 1e-7), 10.0):.4g}")
-        if self.caustic != self.shown:
-            share = settings.estimate.caustic_radius * self.caustic / self.shown
-            found["estimate.caustic_radius"] = float(f"{min(max(share, 0.05), 2.0):.4g}")
+            found["estimate.radius"] = float(f"{min(max(first.global_ * self.shown, 1e-7), 10.0):.4g}")
+            if first.usual != first.global_:
+                share = settings.estimate.volume_radius * first.usual / first.global_
+                found["estimate.volume_radius"] = float(f"{max(share, 0.01):.4g}")
+        if not self.alike:
+            share = first.caustic * self.caustic / (first.global_ * self.shown)
+            found["estimate.caustic_radius"] = float(f"{min(max(share, 0.005), 100.0):.4g}")
         return found
 
 
@@ -84,8 +88,8 @@ class Measured:
     """Relative variances of a pass: `eye` what photons don't decide, `direct` as much of it as goes with one over the
     number of light samples, and falls with the power `complement` of the passes; of one trajectory, `caustic` what
     look-ups of caustics decide, `shown` those of a global map that is shown, `gathered` the rest. `bias`: of the first
-    pass. `radius`: of the first pass, relative to the scene. `covered`: share of the light that photons for the caustic
-    map alone start in, 0 where there are none."""
+    pass. `first`: radii of the first pass, relative to the scene. `covered`: share of the light that photons for the
+    caustic map alone start in, 0 where there are none."""
 
     candidate: Candidate
     costs: Costs
@@ -94,7 +98,7 @@ class Measured:
     shown: float = 0.0
     gathered: float = 0.0
     bias: Bias = field(default_factory=Bias)
-    radius: float = 0.0
+    first: FirstRadii = field(default=NO_RADII)
     covered: float = 0.0
     direct: float = 0.0
     complement: float = BY_POWER

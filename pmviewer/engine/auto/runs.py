@@ -17,8 +17,9 @@ from pmviewer.engine.auto.widths import WIDER
 from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
-from pmviewer.engine.radius import first_radius
+from pmviewer.engine.radius import FirstRadii
 from pmviewer.engine.renderer import Renderer
+from pmviewer.engine.stages.spread import radii_of_first_pass
 from pmviewer.engine.store import StageStore
 from pmviewer.render.camera import resolve_camera
 from pmviewer.render.filter import filter_of, noise_share
@@ -71,12 +72,11 @@ class Run:
 @dataclass
 class Attempt:
     """A candidate's runs: with all photons and with fewer, with other radii, and with more light samples. `gathered`:
-    with a wider one where gather rays end. `radius` and `caustic_radius`: of the first pass, relative to the scene."""
+    with a wider one where gather rays end. `first`: radii of the first pass, relative to the scene."""
 
     candidate: Candidate
     plan: Plan
-    radius: float
-    caustic_radius: float
+    first: FirstRadii
     runs: list[Run]
     caustic: list[Run] = field(default_factory=list)
     shown: list[Run] = field(default_factory=list)
@@ -158,26 +158,33 @@ class Trier:
         renderer.step()
         self._light[chosen.photons.N] = renderer.tally.stage_seconds.get("light pass", 0.0)
         photons = renderer.latest.maps.photons if renderer.latest is not None else None
-        usual = first_radius(self._opened.flat, self._full, chosen.estimate, True)
+        usual = self._first(chosen).global_
         places = photons.global_[:, :3] if photons is not None else np.empty((0, 3), np.float32)
         wider = wider_by(places, chosen.photons.N, usual, seconds)
         if wider == 1.0:
             return candidates
-        radius = usual / self._opened.flat.radius
-        return [with_wider(c, self.settings_of(c), radius, wider) if c.gathers else c for c in candidates]
+        return [self._with_wider(c, wider) if c.gathers else c for c in candidates]
+
+    def _with_wider(self, candidate: Candidate, wider: float) -> Candidate:
+        chosen = self.settings_of(candidate)
+        return with_wider(candidate, chosen, self._first(chosen).scaled(1 / self._opened.flat.radius), wider)
+
+    def _first(self, chosen: Settings) -> FirstRadii:
+        """Radii of the first pass of the whole picture by these settings."""
+        plan = plan_of(chosen, self._opened.traits)
+        return radii_of_first_pass(self._opened, chosen, plan, self._full, self._pool.run, self._store)
 
     def planned(self, candidate: Candidate) -> Attempt:
         """All its runs, with no pictures yet."""
         chosen = self.settings_of(candidate)
         plan = plan_of(chosen, self._opened.traits)
-        radius = first_radius(self._opened.flat, self._full, chosen.estimate, plan.gather) / self._opened.flat.radius
-        radius = min(max(radius, 1e-7), 10.0)
+        first = self._first(chosen).scaled(1 / self._opened.flat.radius)
         small = with_values(
             chosen,
             {
                 "camera.width": self._size.width,
                 "camera.height": self._size.height,
-                "estimate.radius": radius,
+                **first.values(chosen.estimate),
                 "gather.cache_min": max(chosen.gather.cache_min * self._side, 0.1),
                 "gather.cache_max": max(chosen.gather.cache_max * self._side, 1.0),
             },
@@ -185,16 +192,17 @@ class Trier:
         N = chosen.photons.N
         counts = (N, N // FEWER) if plan.photons else (N,)
         runs = [Run(with_values(small, {"photons.N": count})) for count in counts]
-        found = Attempt(candidate, plan, radius, radius * chosen.estimate.caustic_radius, runs)
+        found = Attempt(candidate, plan, first, runs)
+        there = replace(first, usual=first.global_)  # media in the small pictures go with that, as a number
         if plan.shown_directly:
-            found.shown = [Run(with_values(small, w.values(chosen, radius))) for w in _either("shown")]
+            found.shown = [Run(with_values(small, w.values(small, there))) for w in _either("shown")]
         if plan.direct and not plan.gather:  # beside a gather they are the same
             fewest = found.runs[-1].settings
             found.direct = [Run(with_values(fewest, {"direct.samples": MORE * plan.light_samples}))]
         if plan.caustic_mask and not plan.gather:  # beside a gather they are the same
-            found.caustic = [Run(with_values(small, w.values(chosen, radius))) for w in _either("caustic")]
+            found.caustic = [Run(with_values(small, w.values(small, there))) for w in _either("caustic")]
         if candidate.is_like(GATHER):  # the others have about the same
-            found.gathered = [Run(with_values(small, Widths(shown=WIDER).values(chosen, radius)))]
+            found.gathered = [Run(with_values(small, Widths(shown=WIDER).values(small, there)))]
         return found
 
     def begin(self) -> None:

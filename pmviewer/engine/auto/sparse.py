@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.auto.candidates import Candidate
+from pmviewer.engine.auto.measured import Widths
+from pmviewer.engine.radius import FirstRadii
 from pmviewer.settings.access import SETTINGS, Settings
 
 HELD = 4
@@ -45,12 +47,9 @@ def wider_by(positions: NDArray[np.float32], N: int, usual: float, seconds: floa
     return wider if wider >= LEAST else 1.0
 
 
-def with_wider(candidate: Candidate, settings: Settings, radius: float, wider: float) -> Candidate:
-    """The way to gather with look-ups so many times as wide as the automatic `radius`, relative to the scene. Those of
-    caustics stay. settings: the candidate's."""
-    values = {
-        "estimate.radius": float(f"{min(max(wider * radius, 1e-7), 10.0):.4g}"),
-        "estimate.caustic_radius": float(f"{settings.estimate.caustic_radius / wider:.4g}"),
-    }
+def with_wider(candidate: Candidate, settings: Settings, first: FirstRadii, wider: float) -> Candidate:
+    """The way to gather with look-ups in the global map so many times as wide as by the automatic radius. Those of
+    caustics stay. settings: the candidate's; first: its radii, relative to the scene."""
+    values = Widths(shown=wider).values(settings, first)
     said = f"photons lie far apart: look-ups of gather rays {wider:.2g} times as wide as usual (estimate.radius)"
     return candidate.having(values, said)

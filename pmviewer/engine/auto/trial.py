@@ -85,7 +85,7 @@ def trial(
         source = tried if tried.caustic or not tried.plan.caustic_mask else with_caustics
         caustic = _widened(source, "caustic", mean, trier.scale, 0.0) if source is not None else NONE
         if source is not None:
-            caustic = caustic.wider(tried.caustic_radius / source.caustic_radius)
+            caustic = caustic.wider(tried.first.caustic / source.first.caustic)
         shown = _widened(tried, "shown", mean, trier.scale, HIDDEN)
         bias = Bias(caustic.blur, shown.blur, interpolated, gathered=at_ends if tried.plan.gather else Blur())
         measured = _measured(tried, (caustic, shown), bias, mean, trier.scale)
@@ -167,7 +167,7 @@ def _measured(tried: Attempt, widened: tuple[Widened, Widened], bias: Bias, mean
         caustic, shown = caustic * fitting, shown * fitting
         gathered = max(photons - caustic - shown, 0.0)
     costs = _costs(tried.runs, (widened[0].cost, widened[1].cost), scale)
-    return Measured(tried.candidate, costs, eye, caustic, shown, RARE * gathered, bias, tried.radius)
+    return Measured(tried.candidate, costs, eye, caustic, shown, RARE * gathered, bias, tried.first)
 
 
 def _sampled(measured: Measured, source: Attempt, mean: F8, scale: float) -> Measured:

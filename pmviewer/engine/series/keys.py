@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import astuple
 from typing import Any
 
 import numpy as np
@@ -10,13 +11,16 @@ from numpy.typing import NDArray
 
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene
-from pmviewer.engine.radius import first_radius
+from pmviewer.engine.radius import FirstRadii
+from pmviewer.engine.stages.spread import radii_of_first_pass
+from pmviewer.engine.store import StageStore
 from pmviewer.errors import SettingError
 from pmviewer.render.camera import CameraPose, resolve_camera
 from pmviewer.scene.description import Scene
 from pmviewer.scene.editing.own import own_numbers
 from pmviewer.settings.access import SETTINGS, Settings, get, with_values
 from pmviewer.settings.film import FilmKey, FilmWay, comparable
+from pmviewer.tasks import in_turn
 
 _CAMERA = ("origin", "target", "up", "fov", "view_width", "shift_x", "shift_y", "aperture", "focus")
 
@@ -72,22 +76,24 @@ def orbits(scene: Scene, settings: Settings, pictures: int, degrees: float) -> l
     ]
 
 
-def automatic_radius(opened: OpenScene, settings: Settings) -> float:
-    """The look-up radius, relative to the scene's, that a picture by these settings takes where it is automatic."""
-    flat, plan = opened.flat, plan_of(settings, opened.traits)
+def automatic_radius(opened: OpenScene, settings: Settings, store: StageStore) -> FirstRadii:
+    """The look-up radii, relative to the scene's, that a picture by these settings takes where they are automatic; the
+    store keeps the photons that tell."""
+    plan = plan_of(settings, opened.traits)
     camera = resolve_camera(opened.scene, settings.camera)
-    automatic = with_values(settings, {"estimate.radius": "auto"}).estimate
-    return first_radius(flat, camera, automatic, plan.gather) / flat.radius
+    automatic = with_values(settings, {"estimate.radius": "auto"})
+    return radii_of_first_pass(opened, automatic, plan, camera, in_turn, store).scaled(1 / opened.flat.radius)
 
 
 def with_one_radius(opened: OpenScene, settings: Sequence[Settings]) -> list[Settings]:
-    """An automatic radius, which follows the camera in steps, as one number for the whole film: the geometric mean of
-    what its pictures would have alone."""
-    radii = [automatic_radius(opened, one) for one in settings if one.estimate.radius == "auto"]
-    if not radii or min(radii) == max(radii):
+    """Automatic radii, which follow the camera in steps, as numbers for the whole film: the geometric mean of what its
+    pictures would have alone."""
+    store = StageStore()
+    radii = [automatic_radius(opened, one, store) for one in settings if one.estimate.radius == "auto"]
+    if len(set(radii)) < 2:
         return list(settings)
-    value = float(np.exp(np.mean(np.log(radii))))
-    return [with_values(one, {"estimate.radius": value}) if one.estimate.radius == "auto" else one for one in settings]
+    first = FirstRadii(*(float(np.exp(np.mean(np.log(parts)))) for parts in zip(*map(astuple, radii), strict=True)))
+    return [with_values(one, first.values(one.estimate)) if one.estimate.radius == "auto" else one for one in settings]
 
 
 def _turned(v: NDArray[np.float64], axis: NDArray[np.float64], angle: float) -> NDArray[np.float64]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.radius import FirstRadii
 from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.engine.stages.light_maps import MapBuilder, of_classes
 from pmviewer.engine.stages.light_plan import light_plan
@@ -55,7 +56,7 @@ class LightStage:
         self,
         index: int,
         N: int,
-        first_radius: float,
+        first: FirstRadii,
         importance: ImportanceStage,
         widest: Mapping[str, float] = MappingProxyType({}),
     ) -> PassMaps:
@@ -70,7 +71,7 @@ class LightStage:
                 return self._told(self.latest)
             index = 0
         carried = self.latest.carried(index) if self.latest is not None else self.taken_over
-        light = light_plan(self.settings, self.plan, importance, index, N, first_radius, widest)
+        light = light_plan(self.settings, self.plan, importance, index, N, first, widest)
         tally, pool = self.tally, self.pool
         traced = tally.timed(pool, "light pass", lambda: traced_pass(self.tracer, light, importance, carried.known))
         maps: PassMaps = tally.timed(pool, "maps", lambda: self.builder.maps(light, traced, carried))

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from pmviewer.engine.method import Plan
-from pmviewer.engine.radius import pass_neighbours, pass_radius, volume_radius
+from pmviewer.engine.radius import FirstRadii, pass_neighbours, pass_radius, volume_radius
 from pmviewer.engine.stages.deposition import Rules, rules_of
 from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.settings.access import Settings
@@ -37,22 +37,24 @@ def light_plan(
     importance: ImportanceStage,
     index: int,
     N: int,
-    first_radius: float,
+    first: FirstRadii,
     widest: Mapping[str, float],
 ) -> LightPlan:
-    """For pass `index`, for which `importance` has run. first_radius: of the first pass, in scene units; widest: the
-    largest radii in use by map, where they may be more than that of the pass."""
+    """For pass `index`, for which `importance` has run. first: radii of the first pass; widest: the largest in
+    use by map, where they may be more than those of the pass."""
     estimate = settings.estimate
-    radius = pass_radius(first_radius, index, estimate, importance.scene.flat.radius)
+    usual, radius = (
+        pass_radius(r, index, estimate, importance.scene.flat.radius) for r in (first.usual, first.global_)
+    )
     radii = {
-        "caustic": radius * estimate.caustic_radius,
+        "caustic": radius * first.caustic / first.global_,
         "global": radius,
-        "volume": volume_radius(radius, index, estimate, importance.scene.scene.media),
+        "volume": volume_radius(usual, index, estimate, importance.scene.scene.media),
     }
     reach = {name: max(r, widest.get(name, 0.0)) for name, r in radii.items()}
     rules = Rules()
     if plan.deposition != "all":
-        rules = rules_of(settings, plan, importance, index, radii, first_radius)
+        rules = rules_of(settings, plan, importance, index, radii, first.global_)
     normals = plan.radiance or (plan.corners and estimate.lookup == "nearest")
     neighbours = pass_neighbours(index, estimate, plan.maps)
     kept = index < importance.store.passes

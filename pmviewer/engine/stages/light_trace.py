@@ -9,7 +9,6 @@ from typing import Any
 from pmviewer.engine.stages.emission import emission_key, guidance_of, guided_photons, note_of
 from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.engine.stages.light_plan import LightPlan
-from pmviewer.engine.stages.thin_glass import thin_key
 from pmviewer.engine.stages.tracer import Tracer
 from pmviewer.photons.emission.guided import Guidance, Known
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
@@ -29,15 +28,7 @@ def traced_pass(tracer: Tracer, light: LightPlan, importance: ImportanceStage, b
     earlier passes."""
     settings, plan, index, N = tracer.settings, tracer.plan, light.index, light.N
     key = (
-        "photons",
-        importance.scene.uid,
-        settings.photons,
-        settings.render.seed,
-        thin_key(settings, plan),
-        index,
-        N,
-        tracer.caustics,
-        light.normals,
+        *tracer.key(importance.scene.uid, index, N, light.normals),
         *light.rules.key,
         *emission_key(settings, plan, importance),
     )

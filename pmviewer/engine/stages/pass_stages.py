@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import Begun, WorkPool
+from pmviewer.engine.radius import FirstRadii
 from pmviewer.engine.stages.estimation import estimate_gathers
 from pmviewer.engine.stages.importance import REFINED_PASSES, ImportanceStage
 from pmviewer.engine.stages.irradiance_cache import fill_cache, recipe
@@ -43,17 +44,17 @@ class PassStages:
         settings: Settings,
         plan: Plan,
         render_camera: CameraPose,
-        first_radius: float,
+        first: FirstRadii,
         pool: WorkPool,
         store: StageStore,
         tally: Tally,
     ) -> None:
-        """render_camera: whom importance is for; first_radius: of look-ups in the first pass, in scene units."""
+        """render_camera: whom importance is for; first: radii of look-ups in the first pass."""
         self.settings, self.plan, self.pool, self.store, self.tally = settings, plan, pool, store, tally
-        self.first_radius = first_radius
+        self.first = first
         scene = self._scene = with_thin_glass(scene, settings, plan)
         self.light = LightStage(scene, settings, plan, pool, store, tally)
-        self.importance = ImportanceStage(scene, settings, plan, render_camera, first_radius, pool, store, tally)
+        self.importance = ImportanceStage(scene, settings, plan, render_camera, first.global_, pool, store, tally)
         self.shadows = ShadowStage(scene, settings, pool, store, tally)
         self.virtual = VirtualStage(scene, settings, pool, store, tally)
 
@@ -63,8 +64,8 @@ class PassStages:
         self.importance.run(0 if self.settings.photons.renew == "once" else index)
         if index > 0 and self.light.lacks_first:
             with self.tally.aside():
-                self.light.run(0, N, self.first_radius, self.importance, widest)
-        return self.light.run(index, N, self.first_radius, self.importance, widest)
+                self.light.run(0, N, self.first, self.importance, widest)
+        return self.light.run(index, N, self.first, self.importance, widest)
 
     def run(
         self,

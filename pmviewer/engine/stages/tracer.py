@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from pmviewer.engine.method import Plan
+from pmviewer.engine.stages.thin_glass import thin_key
 from pmviewer.photons.deposition.fates import Fates
 from pmviewer.photons.deposition.rules import Deposition
 from pmviewer.photons.emission.guided import Guidance, Guided, Known
@@ -35,6 +37,11 @@ class Tracer:
     def caustics(self) -> bool:
         """Whether a caustic map is filled."""
         return bool(self.plan.caustic_classes)
+
+    def key(self, uid: int, index: int, N: int, normals: bool) -> tuple[Any, ...]:
+        """What photons of pass `index` that are all stored, wherever they fall, depend on in the scene of that uid."""
+        photons, seed, thin = self.settings.photons, self.settings.render.seed, thin_key(self.settings, self.plan)
+        return "photons", uid, photons, seed, thin, index, N, self.caustics, normals
 
     def trajectories(self, N: int, guided: Guided | None = None) -> int:
         """How many a pass of N has: those that would fill a map that is not there are left out."""

@@ -74,7 +74,8 @@ class Estimate(Group):
         "auto",
         "Look-up radius of the first pass, relative to the scene's bounding-sphere radius. Automatic: four pixel "
         "footprints at the typical distance of what the camera sees, three below gather rays: the least error after a "
-        "few passes. So small pictures lack light near edges and on small things, until the radius has shrunk.",
+        "few passes; wider in the global map where it is shown directly and few photons reach what is seen. So small "
+        "pictures lack light near edges and on small things, until the radius has shrunk.",
         stage="maps",
         scale="log",
         unit="× scene",
@@ -82,14 +83,15 @@ class Estimate(Group):
         le=10.0,
         needs=(RADIUS_OR_MEDIA,),
     )
-    caustic_radius: float = setting(
-        0.5,
-        "Radius of caustic look-ups relative to that of global ones: caustics are sharper and their map is denser.",
+    caustic_radius: float | Auto = setting(
+        "auto",
+        "Radius of caustic look-ups relative to that of global ones. Automatic: a half, for caustics are sharper and "
+        "their map is denser; with an automatic radius, wider where few photons of caustics reach what is seen.",
         stage="maps",
         scale="log",
         unit="× radius",
-        ge=0.05,
-        le=2.0,
+        ge=0.005,
+        le=100.0,
         needs=(
             FIXED_RADIUS,
             CAUSTIC_MAP,
@@ -97,7 +99,8 @@ class Estimate(Group):
     )
     volume_radius: float = setting(
         1.0,
-        "Radius of look-ups in media relative to that of the global map: photons so near a ray light it.",
+        "Radius of look-ups in media relative to that of the global map, but for what an automatic one is wider as "
+        "photons lie far apart: photons so near a ray light it.",
         stage="maps",
         scale="log",
         unit="×",
