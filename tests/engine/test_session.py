@@ -133,26 +133,30 @@ def count_light_passes(monkeypatch):
 
 
 def test_only_what_follows_is_recomputed(session, monkeypatch):
-    """Camera, radius and filter use the photons of the first passes again; N and the seed do not."""
+    """Camera, radius and filter use the photons of the first passes again, and those that radii follow from; N and the
+    seed use the latter alone."""
     calls = count_light_passes(monkeypatch)
     session.open(cornell_box())
     session.wait(timeout=PATIENCE)
-    assert len(calls) == 4  # the coarse frame has the photons of pass 0 where N is small
+    assert len(calls) == 1 + 4  # for radii, and of passes: the coarse frame has pass 0's where N is small
     for path, value in (
         ("camera.fov", 60.0),
-        ("estimate.radius", 0.05),
+        ("estimate.caustic_radius", 0.3),
         ("estimate.filter", "cone"),
         ("gather.rays", 2),
     ):
         session.set(with_values(session.settings, {path: value}))
         assert session.wait(timeout=PATIENCE)
-        assert len(calls) == 4, path
+        assert len(calls) == 5, path
     session.set(with_values(session.settings, {"photons.N": 2500}))
     session.wait(timeout=PATIENCE)
-    assert len(calls) == 8
+    assert len(calls) == 9
     session.set(with_values(session.settings, {"render.seed": 5}))
     session.wait(timeout=PATIENCE)
-    assert len(calls) == 12
+    assert len(calls) == 13
+    session.set(with_values(session.settings, {"estimate.radius": 0.05}))
+    assert session.wait(timeout=PATIENCE)
+    assert len(calls) == 13
 
 
 def test_display_settings_recompute_nothing(session):
