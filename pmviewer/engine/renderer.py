@@ -36,7 +36,7 @@ from pmviewer.engine.stages.light import LightStage
 from pmviewer.engine.stages.pass_data import RenderedPass
 from pmviewer.engine.stages.pass_maps import Carried
 from pmviewer.engine.stages.pass_stages import MadeAhead, PassStages
-from pmviewer.engine.stages.spread import radii_of_first_pass
+from pmviewer.engine.stages.spread import TRACED, radii_of_first_pass
 from pmviewer.engine.stages.virtual_lights import film_of
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally
@@ -60,7 +60,7 @@ from pmviewer.settings.needs import Facts
 from pmviewer.state import State
 
 COARSE_SHRINK = 4
-COARSE_PHOTONS = 40_000
+COARSE_PHOTONS = TRACED
 COARSE_PIXELS = 160 * 160
 
 

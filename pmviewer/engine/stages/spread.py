@@ -79,7 +79,7 @@ def radii_of_first_pass(
 
 
 def _widened(usual: float, wanted: float, flat: FlatScene) -> float:
-    """In steps."""
+    """The wanted radius in steps, no narrower than the usual one and within bounds."""
     return usual * rounded(min(max(wanted / usual, 1.0), MOST, max(LARGEST * flat.radius / usual, 1.0)))
 
 
@@ -122,7 +122,8 @@ def _seen(scene: OpenScene, camera: CameraPose, settings: Settings, photons: NDA
     origins, directions, t, prims = seen_from(flat, camera, PROBES)
     mirrors = np.array([is_mirror(each, settings.photons.glossy) for each in flat.owner.materials], bool)
     marks = np.zeros(len(prims), np.uint8)
-    mark_mirrors(flat.record, prims, mirrors, marks)
+    if mirrors.any():
+        mark_mirrors(flat.record, prims, mirrors, marks)
     stored = marks == 0
     if len(photons) < NEAREST or not stored.any():
         return 0.0
