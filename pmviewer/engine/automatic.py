@@ -24,7 +24,8 @@ def automatic_values(looked: Looked, first: FirstRadii) -> dict[str, Any]:
     found: dict[str, Any] = {"light.rig": _rig(looked.scene), "render.lights": "hidden" if plan.hides else "shown"}
     if plan.photons:
         found["estimate.radius"] = first.global_ / radius
-        found["estimate.caustic_radius"] = first.caustic / first.global_
+        automatic = settings.estimate.radius == "auto"
+        found["estimate.caustic_radius"] = first.caustic / (first.usual if automatic else first.global_)
         found["photons.max_bounces"] = most_bounces(settings.photons, plan.media)
         found["photons.projection"] = "off" if looked.light.tracer.projection is None else "on"
     if not plan.path:

@@ -253,7 +253,7 @@ def test_radii_are_settings():
     assert Widths(caustic=0.5).values(settings, RADII) == {"estimate.caustic_radius": 0.25}
     assert Widths(shown=2.0).values(settings, RADII) == both | {"estimate.caustic_radius": 0.25}
     sparse = FirstRadii(0.02, 0.08, 0.04)
-    assert Widths(caustic=0.5).values(settings, sparse) == {"estimate.caustic_radius": 0.25}
+    assert Widths(caustic=0.5).values(settings, sparse) == {"estimate.caustic_radius": 1.0}
     media = {"estimate.volume_radius": 0.25}
     assert Widths(shown=0.5).values(settings, sparse) == media | {
         "estimate.radius": 0.04,

@@ -105,7 +105,7 @@ def test_numbers_stay_as_they_are_given(pool):
     automatic = made(scene, pool).settled_radii
     share = made(scene, pool, estimate__caustic_radius=0.3).settled_radii
     assert share.global_ == automatic.global_
-    assert share.caustic == pytest.approx(0.3 * automatic.global_)
+    assert share.caustic == pytest.approx(0.3 * automatic.usual)
     nearest = made(scene, pool, estimate__lookup="nearest").settled_radii
     assert nearest.global_ == nearest.usual == automatic.usual
 

@@ -38,7 +38,8 @@ class Widths:
                 share = settings.estimate.volume_radius * first.usual / first.global_
                 found["estimate.volume_radius"] = float(f"{max(share, 0.01):.4g}")
         if not self.alike:
-            share = first.caustic * self.caustic / (first.global_ * self.shown)
+            radius = first.usual if self.shown == 1.0 else first.global_ * self.shown  # an automatic one is as wide
+            share = first.caustic * self.caustic / radius
             found["estimate.caustic_radius"] = float(f"{min(max(share, 0.005), 100.0):.4g}")
         return found
 

@@ -71,9 +71,7 @@ def radii_of_first_pass(
     photons = _traced(scene, settings, plan, run, store)
     if shown:
         global_ = _widened(usual, _seen(scene, camera, settings, of_classes(photons.global_, shown)[:, :3]), flat)
-    if asked != "auto":
-        caustic = global_ * asked
-    elif looked_up:
+    if looked_up:
         caustic = _widened(caustic, _around(camera, of_classes(photons.caustic, looked_up)[:, :3]), flat)
     return FirstRadii(usual, global_, caustic)
 

@@ -85,8 +85,9 @@ class Estimate(Group):
     )
     caustic_radius: float | Auto = setting(
         "auto",
-        "Radius of caustic look-ups relative to that of global ones. Automatic: a half, for caustics are sharper and "
-        "their map is denser; with an automatic radius, wider where few photons of caustics reach what is seen.",
+        "Radius of caustic look-ups relative to that of global ones; to an automatic one before that is made wider for "
+        "few photons. Automatic: a half, for caustics are sharper and their map is denser; with an automatic radius, "
+        "wider where few photons of caustics reach what is seen.",
         stage="maps",
         scale="log",
         unit="× radius",
