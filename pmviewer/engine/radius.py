@@ -9,13 +9,13 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.maps.estimate.nearest import shrunk
 from pmviewer.maps.radius import automatic_volume_radius, progressive_radius
 from pmviewer.render.camera import CameraPose
+from pmviewer.render.closest_hits import closest_hits
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.scene.medium import Medium
-from pmviewer.settings.access import Estimate
+from pmviewer.settings.access import SETTINGS, Estimate
 
 FOOTPRINTS, GATHER_FOOTPRINTS = 4.0, 3.0
 """Radius in pixel footprints: maps shown directly need a calm estimate; gather rays average it anyway, so that theirs
@@ -41,16 +41,19 @@ class FirstRadii:
     def values(self, estimate: Estimate) -> dict[str, float]:
         """The settings that stand for these radii, which are relative to the scene, as numbers; `estimate` has what
         media have."""
-        found = {
-            "estimate.radius": min(max(self.global_, 1e-7), 10.0),
-            "estimate.caustic_radius": min(max(self.caustic / self.global_, 0.005), 100.0),
-        }
+        found = {"estimate.radius": self.global_, "estimate.caustic_radius": self.caustic / self.global_}
         if self.usual != self.global_:
-            found["estimate.volume_radius"] = max(estimate.volume_radius * self.usual / self.global_, 0.01)
-        return found
+            found["estimate.volume_radius"] = estimate.volume_radius * self.usual / self.global_
+        return {name: within(name, value) for name, value in found.items()}
 
 
 NO_RADII = FirstRadii(0.0, 0.0, 0.0)
+
+
+def within(name: str, value: float) -> float:
+    """The value, or the nearest that the setting of that name may have."""
+    info = SETTINGS[name]
+    return min(max(value, info.lower or 0.0), info.upper or math.inf)
 
 
 def rounded(radius: float) -> float:
@@ -65,13 +68,10 @@ def seen_from(
     and primitives (n,) of those that meet something."""
     u = (np.arange(probes) + 0.5) / probes
     x, y = (g.reshape(-1) for g in np.meshgrid(u * camera.width, u * camera.height))
-    origins, directions = (np.ascontiguousarray(part, np.float32) for part in camera.rays(x, y))
-    n = len(directions)
-    tmin, tmax = np.zeros(n, np.float32), np.full(n, np.inf, np.float32)
-    t, prim, uv = np.empty(n, np.float32), np.empty(n, np.int32), np.empty((n, 2), np.float32)
-    cast_closest(scene.record[0], origins, directions, tmin, tmax, t, prim, uv)
-    met = prim >= 0
-    return origins[met], directions[met], t[met], prim[met]
+    origins, directions = (np.asarray(part, np.float32) for part in camera.rays(x, y))
+    t, prims = closest_hits(scene.record[0], origins, directions)
+    met = prims >= 0
+    return origins[met], directions[met], t[met], prims[met]
 
 
 def typical_distance(scene: FlatScene, camera: CameraPose) -> float:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.scene import material_of
 from pmviewer.render.camera import CameraPose
+from pmviewer.render.closest_hits import closest_hits
 from pmviewer.render.pixel_samples import MIRRORED
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.scene.arrays.material_lobes import always_followed, glossy_roughness, has_diffuse_lobe
@@ -37,6 +37,11 @@ def is_mirror(material: Material, glossy: float) -> bool:
     return followed and not has_diffuse_lobe(material) and not any(alpha >= glossy for alpha in alphas)
 
 
+def mirrors_of(scene: FlatScene, glossy: float) -> NDArray[np.bool_]:
+    """Which of its materials are mirrors (`is_mirror`), by material."""
+    return np.array([is_mirror(material, glossy) for material in scene.owner.materials], bool)
+
+
 def block_of(camera: CameraPose) -> int:
     """Pixels along the sides of the squares that one ray marks; 1 where pixels lie apart."""
     return max(1, min(BLOCK, min(camera.width, camera.height) // BLOCKS)) if camera.pixel_side == 1.0 else 1
@@ -45,18 +50,14 @@ def block_of(camera: CameraPose) -> int:
 def mirrored_pixels(scene: FlatScene, camera: CameraPose, glossy: float) -> NDArray[np.uint8]:
     """(width · height,) uint8, MIRRORED where the middle of the pixel's square shows a mirror or glass; (0,)
     where none does."""
-    mirrors = np.array([is_mirror(material, glossy) for material in scene.owner.materials], bool)
+    mirrors = mirrors_of(scene, glossy)
     if not mirrors.any():
         return np.zeros(0, np.uint8)
     block = block_of(camera)
     columns, rows = (-(-side // block) for side in (camera.width, camera.height))
     x, y = (block * (places.ravel() + 0.5) for places in np.meshgrid(np.arange(columns), np.arange(rows)))
-    origins, directions = (np.ascontiguousarray(part, np.float32) for part in camera.rays(x, y))
-    n = len(directions)
-    tmin, tmax = np.zeros(n, np.float32), np.full(n, np.inf, np.float32)
-    t, prims, uv = np.empty(n, np.float32), np.empty(n, np.int32), np.empty((n, 2), np.float32)
-    cast_closest(scene.record[0], origins, directions, tmin, tmax, t, prims, uv)
-    blocks = np.zeros(n, np.uint8)
+    _, prims = closest_hits(scene.record[0], *camera.rays(x, y))
+    blocks = np.zeros(len(prims), np.uint8)
     mark_mirrors(scene.record, prims, mirrors, blocks)
     if not blocks.any():
         return np.zeros(0, np.uint8)

@@ -8,7 +8,7 @@ from typing import Any
 
 from pmviewer.engine.auto.bias import Bias
 from pmviewer.engine.auto.candidates import Candidate
-from pmviewer.engine.radius import NO_RADII, FirstRadii
+from pmviewer.engine.radius import NO_RADII, FirstRadii, within
 from pmviewer.settings.access import Settings
 
 BY_POWER, BY_PHOTONS = 1.3, 1.1
@@ -31,17 +31,13 @@ class Widths:
 
     def values(self, settings: Settings, first: FirstRadii) -> dict[str, Any]:
         """The settings that they stand for, where the automatic radii are these, relative to the scene."""
-        found: dict[str, Any] = {}
-        if self.shown != 1.0:
-            found["estimate.radius"] = float(f"{min(max(first.global_ * self.shown, 1e-7), 10.0):.4g}")
-            if first.usual != first.global_:
-                share = settings.estimate.volume_radius * first.usual / first.global_
-                found["estimate.volume_radius"] = float(f"{max(share, 0.01):.4g}")
-        if not self.alike:
-            radius = first.usual if self.shown == 1.0 else first.global_ * self.shown  # an automatic one is as wide
-            share = first.caustic * self.caustic / radius
-            found["estimate.caustic_radius"] = float(f"{min(max(share, 0.005), 100.0):.4g}")
-        return found
+        if self.alike:
+            return {}
+        wide = FirstRadii(self.shown * first.usual, self.shown * first.global_, self.caustic * first.caustic)
+        found = wide.values(settings.estimate)
+        if self.shown == 1.0:  # the radius stays automatic, and that of caustics goes with the usual one
+            found = {"estimate.caustic_radius": within("estimate.caustic_radius", wide.caustic / first.usual)}
+        return {name: float(f"{value:.4g}") for name, value in found.items()}
 
 
 AUTOMATIC = Widths()
@@ -99,7 +95,7 @@ class Measured:
     shown: float = 0.0
     gathered: float = 0.0
     bias: Bias = field(default_factory=Bias)
-    first: FirstRadii = field(default=NO_RADII)
+    first: FirstRadii = NO_RADII
     covered: float = 0.0
     direct: float = 0.0
     complement: float = BY_POWER

@@ -22,10 +22,10 @@ from pmviewer.engine.stages.light_maps import of_classes
 from pmviewer.engine.stages.projection import projection_for
 from pmviewer.engine.stages.tracer import Tracer
 from pmviewer.engine.store import StageStore
-from pmviewer.kernels.accel.raycast import cast_closest
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.render.camera import CameraPose
-from pmviewer.render.mirrored import is_mirror, mark_mirrors
+from pmviewer.render.closest_hits import closest_hits
+from pmviewer.render.mirrored import mark_mirrors, mirrors_of
 from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.settings.access import SETTINGS, Settings, with_values
 from pmviewer.tasks import Runner
@@ -118,7 +118,7 @@ def _seen(scene: OpenScene, camera: CameraPose, settings: Settings, photons: NDA
     can be told."""
     flat = scene.flat
     origins, directions, t, prims = seen_from(flat, camera, PROBES)
-    mirrors = np.array([is_mirror(each, settings.photons.glossy) for each in flat.owner.materials], bool)
+    mirrors = mirrors_of(flat, settings.photons.glossy)
     marks = np.zeros(len(prims), np.uint8)
     if mirrors.any():
         mark_mirrors(flat.record, prims, mirrors, marks)
@@ -155,11 +155,5 @@ def _hidden(record: NDArray[np.void], starts: NDArray[np.float64], ends: NDArray
     """Whether something stands between starts and ends (n, k, 3), as (n, k)."""
     ways = (ends - starts).reshape(-1, 3)
     lengths = np.maximum(np.linalg.norm(ways, axis=1), 1e-30)
-    n = len(ways)
-    origins, directions = (
-        np.ascontiguousarray(part, np.float32) for part in (starts.reshape(-1, 3), ways / lengths[:, None])
-    )
-    tmin, tmax = np.zeros(n, np.float32), ((1 - SHORT) * lengths).astype(np.float32)
-    t, prims, uv = np.empty(n, np.float32), np.empty(n, np.int32), np.empty((n, 2), np.float32)
-    cast_closest(record[0], origins, directions, tmin, tmax, t, prims, uv)
+    _, prims = closest_hits(record[0], starts.reshape(-1, 3), ways / lengths[:, None], (1 - SHORT) * lengths)
     return (prims >= 0).reshape(starts.shape[:2])
