@@ -55,13 +55,14 @@ CHOSEN = (
 CHOSEN_WAYS = (
     "; what every way of such scenes has, such as caustics of lights alone and photons' roulette, light samples with "
     "several lights, the choice of lights by distance, how noise is taken to fall, how wide radii that wait may be, "
-    "and what photons shown directly have to promise were chosen with these scenes too, and how wide look-ups are "
-    "where photons lie far apart with four of them"
+    "what photons shown directly have to promise, and how many photons look-ups of maps that are shown hold at first "
+    "were chosen with these scenes too, and how wide gather rays' look-ups are where photons lie far apart with four "
+    "of them"
 )
 """CHANNEL_ROULETTE, LIGHTS_CAUSTICS, THICKER and WIDE_RECORDS of `pmviewer.engine.auto.candidates`, SEVERAL of
 `pmviewer.render.direct.samples`, the automatic `direct.choice`, the powers of `pmviewer.engine.auto.model` and
-`measured`, that its radii are as wide for a time as for an error, SHOWN of `candidates`, and HELD and MOST of
-`pmviewer.engine.auto.sparse`, likewise."""
+`measured`, that its radii are as wide for a time as for an error, SHOWN of `candidates`, HELD and
+CAUSTIC_HELD of `pmviewer.engine.stages.spread`, and HELD and MOST of `pmviewer.engine.auto.sparse`, likewise."""
 CHOSEN_BIAS = "; the least and most that the bias may be were chosen with cornell_caustic"
 """TRUE_BIAS of `pmviewer.engine.auto.estimate`, likewise."""
 

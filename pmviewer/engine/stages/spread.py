@@ -32,7 +32,8 @@ from pmviewer.tasks import Runner
 
 HELD, CAUSTIC_HELD = 8, 4
 """Photons of a pass of the default N that look-ups hold in half of the places, and those of caustics around half of
-their photons: these lie where their light is bright, and its outlines are sharp."""
+their photons: these lie where their light is bright, and its outlines are sharp. Both are smaller than what was best
+after 3 and 4 seconds in most of the scenes above, as the bias stays for long."""
 MOST = 32.0
 """Times the usual radius."""
 LARGEST = 0.1
