@@ -5,12 +5,15 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from pmviewer.commands.choosing import wants_choice
 from pmviewer.commands.cli import main
+from pmviewer.commands.job import Job, Stop
 from pmviewer.output.exr import read_exr
 from pmviewer.output.png import read_png
 from pmviewer.output.session_file import write_session
@@ -40,6 +43,15 @@ def test_scenes_info_settings_and_bench_list(capsys):
     assert all(f"{path} = " in told for path in SETTINGS)
     assert call("bench", "list") == 0
     assert "latency" in capsys.readouterr().out
+
+
+def test_automatic_mode_chooses_for_a_time_where_nobody_has():
+    plain, timed = Job("cornell_diffuse", Settings()), Stop(seconds=5.0)
+    assert wants_choice(timed, plain)
+    assert not wants_choice(Stop(passes=5), plain)
+    assert not wants_choice(timed, replace(plain, told=("photons.q",)))
+    assert not wants_choice(timed, replace(plain, passes=64)), "a session file's picture was made with the defaults"
+    assert wants_choice(Stop(seconds=5.0, auto=True), replace(plain, passes=64))
 
 
 def test_render_tells_where_the_light_went(tmp_path, capsys):
@@ -122,6 +134,7 @@ def test_search_path_finds_what_a_scene_names(tmp_path, capsys, monkeypatch):
         (["render", "cornell_diffuse", "-o", "x.exr", "--passes", "2", "--time", "2"], "exclude"),
         (["render", "cornell_diffuse", "-o", "x.exr", "--passes", "2", "--error", "0.1"], "exclude"),
         (["render", "cornell_diffuse", "-o", "x.exr", "--auto", "--set", "photons.N=9"], "chooses photons.N itself"),
+        (["render", "cornell_diffuse", "-o", "x.exr", "--auto", "--set", "photons.q=1"], "chooses photons.q itself"),
         (["render", "cornell_diffuse", "-o", "x.exr", "-D", "res"], "name=value"),
         (["render", "cornell_diffuse", "-o", "x.exr", "--size", "16x16", "--reference", "auto"], "256×256"),
         (["render", "cornell_diffuse", "-o", "x.exr", "--reference", "no.exr"], "no.exr"),

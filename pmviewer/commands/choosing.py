@@ -6,7 +6,7 @@ import sys
 from dataclasses import dataclass
 from typing import Any
 
-from pmviewer.commands.job import Stop
+from pmviewer.commands.job import Job, Stop
 from pmviewer.commands.progress_bar import progress_bar
 from pmviewer.engine.auto.bias import Bias
 from pmviewer.engine.auto.candidates import given
@@ -20,16 +20,16 @@ LEAST_LEFT = 0.5
 """Share of the time asked for that is rendered whatever the trial took."""
 
 
-def wants_choice(stop: Stop, settings: Settings) -> bool:
-    """Whether automatic mode chooses how such a job is rendered. Raises SettingError where it was asked to and has been
-    told already."""
-    told = given(settings)
+def wants_choice(stop: Stop, job: Job) -> bool:
+    """Whether automatic mode chooses how such a job is rendered: what a session file's picture was made with is chosen,
+    be it the defaults. Raises SettingError where it was asked to and has been told already."""
+    told = given(job.settings, job.told)
     if stop.auto and told:
         names = ", ".join(told[:3]) + (" …" if len(told) > 3 else "")
         raise SettingError(f"--auto chooses {names} itself: leave out what is set of them, or --auto.")
     if stop.auto is not None:
         return stop.auto
-    return not told and (stop.seconds is not None or stop.error is not None)
+    return not told and not job.passes and (stop.seconds is not None or stop.error is not None)
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,8 @@ class Job:
     passes: int | None = None
     snapshots: tuple[tuple[int, Path], ...] = ()
     """Numbers and files of a session file's snapshots, which the window alone reads."""
+    told: tuple[str, ...] = ()
+    """Full names of the settings that the command line gives, defaults among them."""
 
 
 def load_job(source: str, assignments: Iterable[str], defines: Iterable[str], edits: Iterable[str] = ()) -> Job:
@@ -40,8 +42,8 @@ def load_job(source: str, assignments: Iterable[str], defines: Iterable[str], ed
             values["edit.changes"] = {**session.settings.edit.changes, **changes}
         settings = with_values(session.settings, values)
         given = {**session.parameters, **parameters}
-        return Job(str(session.scene), settings, given, session.passes, session.snapshots)
-    return Job(source, with_values(Settings(), values), parameters)
+        return Job(str(session.scene), settings, given, session.passes, session.snapshots, tuple(values))
+    return Job(source, with_values(Settings(), values), parameters, told=tuple(values))
 
 
 def with_snapshots(job: Job, paths: Iterable[Path]) -> Job:

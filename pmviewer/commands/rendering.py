@@ -85,7 +85,7 @@ def render_job(
         try:
             if keeper is not None and keeper.found is not None:
                 choice = Chosen(keeper.settings(settings))
-            elif wants_choice(stop, job.settings):
+            elif wants_choice(stop, job):
                 choice = with_choice(opened, settings, pool, cluster is not None)
             if keeper is not None:
                 keeper.trial(settings, choice.seconds)

@@ -41,12 +41,13 @@ def view(
     from pmviewer.commands.job import load_job, with_snapshots
     from pmviewer.engine.cluster.address import check_address
     from pmviewer.settings.access import with_values
+    from pmviewer.settings.presets import RESET
 
     if cluster is not None:
         check_address(cluster)
 
     job = with_snapshots(load_job(scene, set_ or [], define or [], edit or []), snapshot or [])
-    if job.passes is not None:  # what is kept in a session file is chosen
+    if job.passes is not None or any(path.startswith(RESET) for path in job.told):  # somebody has chosen
         job = replace(job, settings=with_values(job.settings, {"display.automatic": False}))
     try:
         from pmviewer.library.attaching.listening import attachable

@@ -2,6 +2,9 @@
 
 The user's own window begins a trial by itself, once a scene that is opened shows its first passes, so that no picture
 waits for it. It leaves alone what anybody has chosen: session files, kept films, any setting that a trial would set.
+
+What a trial picked is for its scene and its method: another scene, and another method by hand, have the user's own
+settings again.
 """
 
 from __future__ import annotations
@@ -13,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from pmviewer.engine.frame import Level
 from pmviewer.errors import PmviewerError
 from pmviewer.progress import check
-from pmviewer.settings.access import Settings, get
+from pmviewer.settings.access import Settings, get, with_values
 from pmviewer.viewer.background import CHOOSING, Background, Work
 from pmviewer.viewer.session_link import SessionLike
 
@@ -41,6 +44,8 @@ class AutomaticRun:
         self._session, self._background, self._say, self._change = session, background, say, change
         self._work: Work | None = None
         self._arrived: tuple[Any, Any, Choice] | None = None
+        self._picked: dict[str, tuple[Any, Any]] = {}
+        """What trials have set, by full name: the user's own value and the one that was picked."""
         self.at_start = False
         """Whether scenes that are opened get a trial by themselves, where `display.automatic` is on."""
         self._expected = False
@@ -53,6 +58,12 @@ class AutomaticRun:
     def opening(self, *, chosen: bool) -> None:
         """A scene is being opened; `chosen`: with settings that somebody has kept for it."""
         self._expected = self.at_start and not chosen
+
+    def undone(self, settings: Settings) -> dict[str, Any]:
+        """By full name, the user's own values of what trials have picked and nobody has changed since."""
+        return {
+            path: own for path, (own, picked) in self._picked.items() if own != picked and get(settings, path) == picked
+        }
 
     def start(self) -> None:
         """Begin a trial of the open scene, or cancel the one that runs."""
@@ -112,6 +123,8 @@ class AutomaticRun:
             return
         for number, sentence in enumerate(choice.sentences):
             self._say("info", f"automatic: {sentence}" if number == 0 else f"  {sentence}")
+        own = with_values(now, self.undone(now))
+        self._picked = {path: (get(own, path), value) for path, value in choice.values.items()}
         self._change(dict(choice.values))
 
     def _begin_by_itself(self) -> None:

@@ -156,6 +156,8 @@ class ViewerState:
                     parsed[path] = value
             if list(parsed) == ["camera.name"]:  # another camera as it is, not where this one was moved to
                 parsed |= dict.fromkeys(("camera.origin", "camera.target", "camera.up", "camera.fov"), "auto")
+            if parsed.get("render.method", self.settings.render.method) != self.settings.render.method:
+                parsed = self._without_automatic(parsed)
             if parsed.get("light.rig", self.settings.light.rig) != self.settings.light.rig:
                 parsed = self._without_light_edits(parsed)
             settings = with_values(self.settings, parsed)
@@ -165,6 +167,15 @@ class ViewerState:
         if settings != self.settings:
             self.history.changed(self.settings, settings)
             self.session.set(settings)
+
+    def _without_automatic(self, values: dict[str, Any]) -> dict[str, Any]:
+        """Another method by hand: the numbers that automatic mode picked for the one before, radii first of all, would
+        make it look worse than it is."""
+        own = {path: value for path, value in self.automatic.undone(self.settings).items() if path not in values}
+        if own:
+            names = ", ".join(own)
+            self.say("info", f"What automatic mode chose for {self.settings.render.method} went with it: {names}.")
+        return own | values
 
     def _without_light_edits(self, values: dict[str, Any]) -> dict[str, Any]:
         """Another rig has other lights: edits of those before would name what is not there, and the scene could not be
@@ -393,7 +404,7 @@ class ViewerState:
         `kept` in a checkpoint. Without `remember` it is the scene that is a recent file, not the session.
 
         Settings stay when it is a scene, but for the camera's: that was another scene's unless `keep_camera` says
-        otherwise. `parameters` are values for the scene file's `<default>` names.
+        otherwise; and for what automatic mode picked, for another scene too. `parameters` are values for the scene file's `<default>` names.
         """
         settings = (
             self.settings
@@ -402,6 +413,7 @@ class ViewerState:
                 update={"camera": CameraSettings(), "free_camera": FreeCamera(), "edit": Edit()}
             )
         )
+        settings = with_values(settings, self.automatic.undone(settings))
         source: str | Path = path
         snapshots: tuple[tuple[int, Path], ...] = ()
         film: tuple[FilmKey, ...] = ()

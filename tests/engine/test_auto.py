@@ -169,6 +169,8 @@ def test_a_user_s_own_settings_of_the_method_are_told():
     assert given(Settings()) == []
     assert given(with_values(Settings(), {"camera.width": 32, "render.seed": 5})) == []
     assert given(with_values(Settings(), {"photons.N": 7, "gather.cache": "on"})) == ["photons.N", "gather.cache"]
+    told = ("render.method", "render.seed")  # a default that is given is a choice
+    assert given(Settings(), told) == ["render.method"]
 
 
 @pytest.mark.parametrize("steady", [False, True])

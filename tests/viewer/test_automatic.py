@@ -39,13 +39,45 @@ def test_one_click_chooses_and_one_undo_takes_it_back(app):
         seen["said"] = [message.text for message in app.state.log if message.text.startswith("automatic: ")]
         app.state.undo()
         seen["undone"] = app.state.settings == before
+        app.state.redo()
         wait_until(c, lambda: finished(app))
+        other = next(m for m in SETTINGS["render.method"].choices if m != after.render.method)
+        app.state.change({"estimate.alpha": 0.5})
+        app.state.change({"render.method": other})
+        c.yield_(2)
+        seen["by hand"] = app.state.settings == with_values(before, {"render.method": other, "estimate.alpha": 0.5})
+        seen["why"] = [message.text for message in app.state.log if "What automatic mode chose" in message.text]
 
     drive(app, script)
     assert seen["changed"]
     assert seen["changed"] <= set(assignments({}))
     assert len(seen["said"]) == 1
     assert seen["undone"]
+    assert seen["by hand"], "numbers of one method that automatic mode has chosen are not for another"
+    assert len(seen["why"]) == 1
+    assert "photons.N" in seen["why"][0]
+
+
+def test_another_scene_has_the_own_settings_again_and_a_trial_of_its_own(app):
+    app.state.automatic.at_start = True
+    seen = {}
+
+    def chosen(times):
+        return lambda: sum(m.text.startswith("automatic: ") for m in app.state.log) == times
+
+    def script(c):
+        wait_until(c, lambda: finished(app))
+        app.state.change({"render.passes": 100_000, "photons.N": SETTINGS["photons.N"].default})
+        for times, scene in enumerate(("cornell_diffuse", "corner_room"), 1):
+            app.state.open(scene, keep_camera=True)
+            c.yield_(2)
+            seen[scene] = app.state.automatic.undone(app.state.settings)
+            wait_until(c, chosen(times))
+            c.yield_(2)
+
+    drive(app, script)
+    assert seen == {"cornell_diffuse": {}, "corner_room": {}}
+    assert app.state.automatic.undone(app.state.settings)
 
 
 def test_a_scene_that_is_opened_is_tried_by_itself_once_it_shows_passes(app):

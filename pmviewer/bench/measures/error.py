@@ -8,6 +8,7 @@ trial is not counted: its seconds stand in the notes.
 from __future__ import annotations
 
 import math
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -147,6 +148,7 @@ def measure(
                 break
     finally:
         pool.close()
+    print(curve.scene, method, f"{curve.error[-1]:.3g} after {curve.cpu[-1]:.3g} CPU s", file=sys.stderr, flush=True)
     return curve
 
 

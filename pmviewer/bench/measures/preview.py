@@ -13,6 +13,7 @@ mean, whatever noise is left in A and B.
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from collections.abc import Mapping
@@ -223,13 +224,15 @@ def run(quick: bool = False, scenes: int | None = None, keep: Path | None = None
     targets: list[Target] = []
     for name in list(SCENES)[: 1 if quick else scenes]:
         opened = open_scene(name)
+        print(f"{name}: the converged pictures", file=sys.stderr, flush=True)
         truth = truth_of(opened, size, share * SCENES[name][1], keep)
         base = with_values(Settings(), {"camera.width": size, "camera.height": size, "render.passes": 100_000})
         for chosen, preview in MODES:
             values = _chosen(opened, base) if chosen == "automatic" else {}
             settings = with_values(base, {**values, "display.preview": preview})
-            found = measured(name, settings, truth, size)
             mode = f"{chosen}, preview {preview}"
+            print(f"{name}: {mode}", file=sys.stderr, flush=True)
+            found = measured(name, settings, truth, size)
             for change, errors in found.items():
                 for when, (error, then, what) in zip(TIMES, errors, strict=True):
                     rows.append([name, mode, change, when, error, then, what])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -101,9 +101,13 @@ def assignments(values: Mapping[str, Any]) -> dict[str, Any]:
     return {path: info.default for path, info in SETTINGS.items() if path.startswith(RESET)} | dict(values)
 
 
-def given(settings: Settings) -> list[str]:
-    """Settings that automatic mode would set and that somebody has changed already, by full name."""
-    return [path for path, info in SETTINGS.items() if path.startswith(RESET) and get(settings, path) != info.default]
+def given(settings: Settings, told: Collection[str] = ()) -> list[str]:
+    """Settings that automatic mode would set and that somebody has changed already or has `told`, by full name."""
+    return [
+        path
+        for path, info in SETTINGS.items()
+        if path.startswith(RESET) and (path in told or get(settings, path) != info.default)
+    ]
 
 
 def candidates(
