@@ -404,7 +404,8 @@ class ViewerState:
         `kept` in a checkpoint. Without `remember` it is the scene that is a recent file, not the session.
 
         Settings stay when it is a scene, but for the camera's: that was another scene's unless `keep_camera` says
-        otherwise; and for what automatic mode picked, for another scene too. `parameters` are values for the scene file's `<default>` names.
+        otherwise; and for what automatic mode picked, for another scene too. `parameters` are values for the scene
+        file's `<default>` names.
         """
         settings = (
             self.settings
