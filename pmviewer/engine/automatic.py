@@ -26,6 +26,8 @@ def automatic_values(looked: Looked, first: FirstRadii) -> dict[str, Any]:
         found["estimate.radius"] = first.global_ / radius
         automatic = settings.estimate.radius == "auto"
         found["estimate.caustic_radius"] = first.caustic / (first.usual if automatic else first.global_)
+        if first.free_paths > 0:
+            found["estimate.free_paths"] = first.free_paths
         found["photons.max_bounces"] = most_bounces(settings.photons, plan.media)
         found["photons.projection"] = "off" if looked.light.tracer.projection is None else "on"
     if not plan.path:

@@ -20,6 +20,8 @@ from pmviewer.settings.access import SETTINGS, Estimate
 FOOTPRINTS, GATHER_FOOTPRINTS = 4.0, 3.0
 """Radius in pixel footprints: maps shown directly need a calm estimate; gather rays average it anyway, so that theirs
 can be sharper and darken corners less."""
+FREE_PATHS = 0.5
+"""Largest radius of look-ups in media, in mean free paths, where photons are dense enough."""
 PROBES = 24
 STEPS = 4
 """Automatic radii in each doubling: they are rounded, so that a small camera move keeps the maps of the view before."""
@@ -28,15 +30,17 @@ STEPS = 4
 @dataclass(frozen=True)
 class FirstRadii:
     """Of look-ups in the first pass, in scene units or relative to the scene: in the `global_` map and the `caustic`
-    one, and the `usual` one, by pixels alone, which those in media go with."""
+    one, and the `usual` one, by pixels alone, which those in media go with. In these it is so many `free_paths` at
+    most; 0 where that is not automatic, or nothing is looked up in media."""
 
     usual: float
     global_: float
     caustic: float
+    free_paths: float = 0.0
 
     def scaled(self, factor: float) -> FirstRadii:
         """All of them so many times as wide."""
-        return FirstRadii(*(factor * radius for radius in astuple(self)))
+        return FirstRadii(factor * self.usual, factor * self.global_, factor * self.caustic, self.free_paths)
 
     def values(self, estimate: Estimate) -> dict[str, float]:
         """The settings that stand for these radii, which are relative to the scene, as numbers; `estimate` has what
@@ -44,10 +48,19 @@ class FirstRadii:
         found = {"estimate.radius": self.global_, "estimate.caustic_radius": self.caustic / self.global_}
         if self.usual != self.global_:
             found["estimate.volume_radius"] = estimate.volume_radius * self.usual / self.global_
+        if self.free_paths > 0:
+            found["estimate.free_paths"] = self.free_paths
         return {name: within(name, value) for name, value in found.items()}
 
 
 NO_RADII = FirstRadii(0.0, 0.0, 0.0)
+
+
+def mean_radii(radii: Sequence[FirstRadii]) -> FirstRadii:
+    """Their geometric mean."""
+    parts = np.array([astuple(one) for one in radii])
+    logs = np.log(parts, where=parts > 0, out=np.full(parts.shape, -np.inf))
+    return FirstRadii(*(float(mean) for mean in np.exp(logs.mean(axis=0))))
 
 
 def within(name: str, value: float) -> float:
@@ -119,15 +132,17 @@ def pass_radius(first: float, index: int, estimate: Estimate, scene_radius: floa
     return max(first * _shrunk(index, estimate), estimate.floor * scene_radius)
 
 
-def free_paths(index: int, estimate: Estimate) -> float:
+def free_paths(first: FirstRadii, index: int, estimate: Estimate) -> float:
     """Largest radius of look-ups in a medium in pass `index`, in its mean free paths."""
-    return estimate.free_paths * _shrunk(index, estimate)
+    automatic = first.free_paths or FREE_PATHS
+    return (automatic if estimate.free_paths == "auto" else estimate.free_paths) * _shrunk(index, estimate)
 
 
-def volume_radius(radius: float, index: int, estimate: Estimate, media: Sequence[Medium]) -> float:
-    """Largest radius of look-ups in media in pass `index`, whose other look-ups have `radius`, in scene units."""
+def volume_radius(radius: float, paths: float, estimate: Estimate, media: Sequence[Medium]) -> float:
+    """Largest radius of look-ups in media in a pass whose other look-ups have `radius`, in scene units: so many free
+    `paths` at most."""
     longest = max((m.free_path for m in media if max(m.albedo) > 0), default=math.inf)
-    return min(radius * estimate.volume_radius, free_paths(index, estimate) * longest)
+    return min(radius * estimate.volume_radius, paths * longest)
 
 
 def widest_in_media(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import astuple
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene
-from pmviewer.engine.radius import FirstRadii
+from pmviewer.engine.radius import FirstRadii, mean_radii
 from pmviewer.engine.stages.spread import radii_of_first_pass
 from pmviewer.engine.store import StageStore
 from pmviewer.errors import SettingError
@@ -92,7 +91,7 @@ def with_one_radius(opened: OpenScene, settings: Sequence[Settings]) -> list[Set
     radii = [automatic_radius(opened, one, store) for one in settings if one.estimate.radius == "auto"]
     if len(set(radii)) < 2:
         return list(settings)
-    first = FirstRadii(*(float(np.exp(np.mean(np.log(parts)))) for parts in zip(*map(astuple, radii), strict=True)))
+    first = mean_radii(radii)
     return [with_values(one, first.values(one.estimate)) if one.estimate.radius == "auto" else one for one in settings]
 
 

@@ -99,6 +99,7 @@ class MapBuilder:
             corner=corner,
             chooser=chooser,
             volume=volume,
+            free_paths=light.free_paths,
         )
 
     @cached_property

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from pmviewer.engine.method import Plan
-from pmviewer.engine.radius import FirstRadii, pass_neighbours, pass_radius, volume_radius
+from pmviewer.engine.radius import FirstRadii, free_paths, pass_neighbours, pass_radius, volume_radius
 from pmviewer.engine.stages.deposition import Rules, rules_of
 from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.settings.access import Settings
@@ -23,6 +23,7 @@ class LightPlan:
     N: int
     radii: Mapping[str, float]
     reach: Mapping[str, float]
+    free_paths: float
     neighbours: int
     share: float
     normals: bool
@@ -46,10 +47,11 @@ def light_plan(
     usual, radius = (
         pass_radius(r, index, estimate, importance.scene.flat.radius) for r in (first.usual, first.global_)
     )
+    paths = free_paths(first, index, estimate)
     radii = {
         "caustic": radius * first.caustic / first.global_,
         "global": radius,
-        "volume": volume_radius(usual, index, estimate, importance.scene.scene.media),
+        "volume": volume_radius(usual, paths, estimate, importance.scene.scene.media),
     }
     reach = {name: max(r, widest.get(name, 0.0)) for name, r in radii.items()}
     rules = Rules()
@@ -58,4 +60,4 @@ def light_plan(
     normals = plan.radiance or (plan.corners and estimate.lookup == "nearest")
     neighbours = pass_neighbours(index, estimate, plan.maps)
     kept = index < importance.store.passes
-    return LightPlan(index, N, radii, reach, *neighbours, normals, rules, plan.maps, kept)
+    return LightPlan(index, N, radii, reach, paths, *neighbours, normals, rules, plan.maps, kept)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.method import Plan, estimator_of
-from pmviewer.engine.radius import free_paths, volume_neighbours
+from pmviewer.engine.radius import volume_neighbours
 from pmviewer.engine.stages.estimation import Estimates, blank_estimates
 from pmviewer.engine.stages.gather_guides import gather_records
 from pmviewer.engine.stages.pass_maps import LookUpMap, PassMaps, Structure, blank_grid, blank_maps
@@ -89,7 +89,7 @@ def _evaluation(settings: Settings, plan: Plan, maps: PassMaps, index: int) -> E
         several=not plan.one_sample,
         mirror_rays=plan.mirror_rays,
         volume_radius=maps.volume.radius if maps.volume is not None else 0.0,
-        free_paths=free_paths(index, settings.estimate),
+        free_paths=maps.free_paths,
     )
 
 

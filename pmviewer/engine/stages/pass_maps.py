@@ -87,6 +87,7 @@ class PassMaps:
     corner: float = 0.0
     chooser: PhotonGrid | None = None
     volume: LookUpMap | None = None
+    free_paths: float = 0.0
 
     @property
     def by_name(self) -> dict[str, LookUpMap]:

@@ -7,17 +7,23 @@ photons of a pass. But not by more than that is good for: a photon that can't be
 behind a wall, and its light would leak. relMSE after 3 CPU seconds with global look-ups 2 and 4 times as wide, over
 that with the usual ones: office 0.33, 0.19; rooms_10x10 0.30, 0.19; skylight_room 0.40, 0.34; colonnade 0.47, 0.58;
 door_slit, whose door leaks, 0.42, 1.35. Of caustics, after 4: car_cabin 0.23, 0.08; cognac 0.65, 0.60; three_glasses
-0.70, 0.73; cornell_glossy 0.78, 0.80; cornell_caustic 0.94, 2.1; three_balls 1.03, 1.43. Look-ups in media stay.
+0.70, 0.73; cornell_glossy 0.78, 0.80; cornell_caustic 0.94, 2.1; three_balls 1.03, 1.43.
+
+In media it is a share of the free path that bounds look-ups, half of one, which is next to nothing in wax or milk: a
+pixel there has no photon for minutes. Beams go up to two free paths where there are few; their discs lie along the
+boundary (`pmviewer.maps.estimate.beam`).
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
-from pmviewer.engine.radius import FirstRadii, first_radius, rounded, seen_from
+from pmviewer.engine.radius import FREE_PATHS, FirstRadii, first_radius, rounded, seen_from
 from pmviewer.engine.stages.light_maps import of_classes
 from pmviewer.engine.stages.projection import projection_for
 from pmviewer.engine.stages.tracer import Tracer
@@ -34,6 +40,9 @@ HELD, CAUSTIC_HELD = 8, 4
 """Photons of a pass of the default N that look-ups hold in half of the places, and those of caustics around half of
 their photons: these lie where their light is bright, and its outlines are sharp. Both are smaller than what was best
 after 3 and 4 seconds in most of the scenes above, as the bias stays for long."""
+HELD_IN_MEDIA, MOST_PATHS = 32, 2.0
+"""Photons of a pass of the default N that a beam as long as a free path holds in half of the places where photons are,
+and the most free paths that its radius is: two cost 0.3 % of a wax bunny's light, four 2 %."""
 MOST = 32.0
 """Times the usual radius."""
 LARGEST = 0.1
@@ -60,21 +69,46 @@ def radii_of_first_pass(
 
     Raises Cancelled as `run` does."""
     estimate, flat = settings.estimate, scene.flat
+    paths = 0.0
+    if plan.volume and estimate.free_paths == "auto":
+        paths = _paths(scene, settings, plan, run, store)
     usual = global_ = first_radius(flat, camera, estimate, plan.gather)
     asked = estimate.caustic_radius
     caustic = usual * (CAUSTIC_SHARE if asked == "auto" else asked)
     if estimate.radius != "auto" or estimate.lookup == "nearest":
-        return FirstRadii(usual, usual, caustic)
+        return FirstRadii(usual, usual, caustic, paths)
     shown = 0 if plan.gather else plan.shown_directly
     looked_up = plan.caustic_classes if asked == "auto" else 0
     if not (shown or looked_up):
-        return FirstRadii(usual, usual, caustic)
+        return FirstRadii(usual, usual, caustic, paths)
     photons = _traced(scene, settings, plan, run, store)
     if shown:
         global_ = _widened(usual, _seen(scene, camera, settings, of_classes(photons.global_, shown)[:, :3]), flat)
     if looked_up:
         caustic = _widened(caustic, _around(camera, of_classes(photons.caustic, looked_up)[:, :3]), flat)
-    return FirstRadii(usual, global_, caustic)
+    return FirstRadii(usual, global_, caustic, paths)
+
+
+def _paths(scene: OpenScene, settings: Settings, plan: Plan, run: Runner, store: StageStore) -> float:
+    """Free paths that the radius of look-ups in media is at most."""
+    media = [medium for medium in scene.scene.media if max(medium.albedo) > 0]
+    path = min((medium.free_path for medium in media), default=math.inf)
+    if settings.estimate.in_media != "beam" or not all(math.isfinite(medium.free_path) for medium in media):
+        return FREE_PATHS
+    return paths_for(_traced(scene, settings, plan, run, store).volume, path)
+
+
+def paths_for(photons: NDArray[np.float32], path: float) -> float:
+    """The same for photons (n, 6) of TRACED trajectories where free paths are that long, in scene units."""
+    side = 2.0 * path
+    x, y, z = np.floor(photons[:, :3].T.astype(np.float64) / side).astype(np.int64)
+    cells = (x * 73856093) ^ (y * 19349663) ^ (z * 83492791)  # few share one (Teschner et al. 2003)
+    _, cell, counts = np.unique(cells, return_inverse=True, return_counts=True)
+    beside = np.median(counts[cell] - 1.0) if len(photons) else 0.0
+    density = beside / side**3 * SETTINGS["photons.N"].default / TRACED
+    if not density > 0:
+        return MOST_PATHS
+    return rounded(min(max(math.sqrt(HELD_IN_MEDIA / (math.pi * density * path)) / path, FREE_PATHS), MOST_PATHS))
 
 
 def _widened(usual: float, wanted: float, flat: FlatScene) -> float:

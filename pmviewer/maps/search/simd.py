@@ -170,6 +170,43 @@ def nearer8(typingctx, x_address, y_address, z_address, p, n, steepness, r2, e2,
     return signature, codegen
 
 
+def _beside8(block, o, d, r2):
+    offset = offsets(*(block + row * ROW_BYTES for row in range(3)), *o)
+    t = sum(a * c for a, c in zip(offset, d))
+    return bits_of(sum((a - t * c) ** 2 for a, c in zip(offset, d)) < r2)
+
+
+@with_twin(_beside8)
+def beside8(typingctx, block, o, d, r2):
+    """Which photons of a grid's block lie closer than sqrt(r2) to a line.
+
+    block: int64 address of the block; o, d: float32 triples, a point and the unit direction of the line; r2: float32.
+    Returns int32 with bit j set for photon j.
+    """
+    triple = types.UniTuple(types.float32, 3)
+    signature = types.int32(types.int64, triple, triple, types.float32)
+
+    def codegen(context, builder, sig, args):
+        block, o, d, limit = args
+        direction = [splat(builder, x) for x in cgutils.unpack_tuple(builder, d, 3)]
+        offset = [
+            builder.fsub(
+                load_eight(builder, builder.add(block, ir.Constant(I64, ROW_BYTES * row))),
+                splat(builder, coordinate),
+                flags=FAST,
+            )
+            for row, coordinate in enumerate(cgutils.unpack_tuple(builder, o, 3))
+        ]
+        t = dot_of(builder, offset, direction)
+        across = [
+            builder.fsub(a, builder.fmul(t, c, flags=FAST), flags=FAST) for a, c in zip(offset, direction, strict=True)
+        ]
+        mask = builder.fcmp_ordered("<", dot_of(builder, across, across), splat(builder, limit))
+        return builder.zext(builder.bitcast(mask, I8), I32)
+
+    return signature, codegen
+
+
 @with_twin(lambda mask: np.int32((int(mask) & 0xFFFFFFFF).bit_count()))
 def count_bits(typingctx, mask):
     """Number of set bits of an int32."""

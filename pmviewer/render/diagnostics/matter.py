@@ -15,6 +15,7 @@ from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.vector import along
 from pmviewer.maps.estimate.beam import beam_radiance
 from pmviewer.render.cast import cast
+from pmviewer.render.media.ends import beam_of
 from pmviewer.render.media.through import next_boundary, next_stretch
 from pmviewer.render.media.volume import radius_in
 from pmviewer.render.pixel import camera_ray
@@ -84,7 +85,8 @@ def _counted(scene, photons, medium, o, d, length, radius, paths, marks):
     def by_beam(scene, photons, medium, o, d, length, radius, paths, marks):
         column = column_of(scene, medium, o, d, length, marks)
         length = min(length, way_seen(scene, medium))
-        _, count = beam_radiance(scene, photons, o, d, length, radius, paths, column, phase_numbers(scene, medium))
+        beam, lobes = beam_of(scene, o, d, length, radius), phase_numbers(scene, medium)
+        _, count = beam_radiance(scene, photons, beam, radius, paths, column, lobes)
         return count
 
     return by_beam

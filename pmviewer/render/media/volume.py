@@ -32,6 +32,7 @@ from pmviewer.render.direct.direct import found_light
 from pmviewer.render.given import Sampler
 from pmviewer.render.media.distance import distance_in, distance_pdf, equiangular_distance, equiangular_pdf
 from pmviewer.render.media.emitted import emitted_in, emitted_nearby
+from pmviewer.render.media.ends import seen_beam_of
 from pmviewer.render.media.march import marched_radiance, marches
 from pmviewer.render.media.phase_light import one_light_sample
 from pmviewer.render.media.through import next_stretch, way_through
@@ -175,8 +176,8 @@ def _indirect(given, stretch, u):
         o, d, length, medium, column = stretch
         lobes = phase_numbers(given.scene, medium)
         radius = radius_in(given.scene, given.eye, medium)
-        length = min(length, way_seen(given.scene, medium))  # or it would walk through millions of small cells
-        L, _ = beam_radiance(given.scene, given.volume_map, o, d, length, radius, given.eye.free_paths, column, lobes)
+        beam = seen_beam_of(given.scene, medium, o, d, length, radius, u)
+        L, _ = beam_radiance(given.scene, given.volume_map, beam, radius, given.eye.free_paths, column, lobes)
         return L
 
     return by_beam

@@ -109,10 +109,11 @@ class Estimate(Group):
         le=100.0,
         needs=(VOLUME,),
     )
-    free_paths: float = setting(
-        0.5,
+    free_paths: float | Auto = setting(
+        "auto",
         "Largest radius of look-ups in a medium, in mean free paths of it, in the first pass: a wider one misses light "
-        "within it at boundaries, a fifth of what shines through marble. On lattices it is each photon's own.",
+        "within it where it is curved or thin. On lattices it is each photon's own. Automatic: a half, and by beams in "
+        "media that are the same everywhere up to two, where few photons are in them.",
         stage="maps",
         scale="log",
         unit="free paths",
