@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from PIL import Image
 
 from pmviewer.errors import SceneError
@@ -14,7 +16,7 @@ from pmviewer.output.exr import write_exr
 from pmviewer.scene.analysis import analyse
 from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.describe import describe
-from pmviewer.scene.description import DirectionalLight, ImageEnvironment, SpotLight
+from pmviewer.scene.description import DirectionalLight, ImageEnvironment, ProjectorLight, SpotLight
 from pmviewer.scene.emission import emitted_power
 from pmviewer.scene.formats.hdr import read_hdr
 from pmviewer.scene.formats.sky_image import read_sky
@@ -22,6 +24,7 @@ from pmviewer.scene.formats.texture_file import read_picture
 from tests.scene.helpers import load
 
 SHAPE = '<shape type="sphere"/>'
+WIDE = '<float name="cutoff_angle" value="88"/>'
 
 
 def envmap(*inside: str, name: str = "sky.exr") -> str:
@@ -91,7 +94,7 @@ TURN = '<transform name="to_world"><translate y="4"/></transform>'
         (envmap('<transform name="to_world"><scale x="2"/></transform>'), "only its rotation", True),
         (envmap('<float name="scale" value="-1"/>'), "-1 was taken as 0", False),
         (envmap('<float name="other" value="1"/>'), "'other'", True),
-        ('<emitter type="spot"><texture name="texture" type="checkerboard"/></emitter>', "its texture", True),
+        (f'<emitter type="spot">{WIDE}<texture name="texture" type="checkerboard"/></emitter>', "its texture", True),
         ('<emitter type="projector"><transform name="to_world"><scale value="0"/></transform></emitter>', "no dir", 0),
         ('<emitter type="projector"><float name="scale" value="-1"/></emitter>', "-1 was taken as 0", False),
         ('<emitter type="projector"><rgb name="irradiance" value="-1 2 2"/></emitter>', "numbers count as 0", True),
@@ -109,12 +112,52 @@ def test_odd_lights_are_cut_or_left_out(tmp_path: Path, light: str, words: str, 
     assert len(scene.lights) == 1 + bool(left)
 
 
-def test_a_spots_texture_counts_by_its_mean(tmp_path: Path) -> None:
-    board = '<texture name="texture" type="checkerboard"><rgb name="color0" value="1 0 0"/></texture>'
-    scene = load(tmp_path, SHAPE, f'<emitter type="spot"><rgb name="intensity" value="10"/>{board}</emitter>', sky="")
-    (spot,) = scene.lights
+BOARD = '<texture name="texture" type="checkerboard"><rgb name="color0" value="1 0 0"/></texture>'
+
+
+def test_the_texture_of_a_wide_spot_counts_by_its_mean(tmp_path: Path) -> None:
+    words = f'<emitter type="spot">{WIDE}<rgb name="intensity" value="10"/>{BOARD}</emitter>'
+    (spot,) = load(tmp_path, SHAPE, words, sky="").lights
     assert isinstance(spot, SpotLight)
     assert spot.intensity == pytest.approx((6, 1, 1))
+
+
+def test_a_spot_throws_its_texture(tmp_path: Path) -> None:
+    """In a direction (x, y, z) of its own it has the texture's colour at (1 + x/(z tan c))/2, (1 + y/(z tan c))/2 times
+    the intensity, which falls with the angle from 30° to the cut-off c = 40°; on the plane z = 1 that is cos³ as much
+    irradiance."""
+    angles = '<float name="cutoff_angle" value="40"/><float name="beam_width" value="30"/>'
+    words = f'<emitter type="spot">{angles}<rgb name="intensity" value="10"/>{BOARD}{TURN}</emitter>'
+    (light,) = load(tmp_path, SHAPE, words, sky="").lights
+    assert isinstance(light, ProjectorLight)
+    assert light.position == (0, 4, 0)
+    slope = math.tan(math.radians(40))
+    assert light.half == pytest.approx((slope, slope))
+
+    def thrown(degrees: float, around: float) -> NDArray[np.float32]:
+        """At that angle off the axis, turned from the left to the top."""
+        x, y = (math.tan(math.radians(degrees)) / slope * f(math.radians(around)) for f in (math.cos, math.sin))
+        column = int(np.abs(light.columns - (1 - x) / 2).argmin())
+        return light.pixels[int(np.abs(light.rows - (1 - y) / 2).argmin()), column]
+
+    left_top, right_top = thrown(20, 45), thrown(20, 135)
+    np.testing.assert_allclose(left_top, thrown(20, 225))
+    np.testing.assert_allclose(right_top, thrown(20, 315))
+    red, grey = np.array([10, 0, 0]), np.array([2, 2, 2])
+    np.testing.assert_allclose(left_top, red * math.cos(math.radians(20)) ** 3, rtol=0.01)
+    np.testing.assert_allclose(right_top, grey * math.cos(math.radians(20)) ** 3, rtol=0.01)
+    np.testing.assert_allclose(thrown(36, 45), 0.4 * red * math.cos(math.radians(36)) ** 3, rtol=0.05)
+    assert (thrown(41, 45) == 0).all()
+    sums = emitted_power(light, 1.0)
+    ring = 2 * math.pi * (1 - math.cos(math.radians(30)))
+    assert sums[0] == pytest.approx(6 * (ring + falling(30, 40)), rel=0.01)
+
+
+def falling(beam: float, cutoff: float) -> float:
+    """∫ (c − θ)/(c − b) dω between the angles b and c."""
+    theta = np.radians(np.linspace(beam, cutoff, 2001))
+    share = (theta[-1] - theta) / (theta[-1] - theta[0])
+    return float(np.trapezoid(share * np.sin(theta), theta)) * 2 * math.pi
 
 
 @pytest.mark.parametrize("name", ["power", "intensity"])

@@ -25,6 +25,7 @@ from pmviewer.scene.formats.mitsuba.interface import bounded
 from pmviewer.scene.formats.mitsuba.projector import read_projector
 from pmviewer.scene.formats.mitsuba.sky import TYPES as DAYLIGHT
 from pmviewer.scene.formats.mitsuba.sky import read_daylight
+from pmviewer.scene.formats.mitsuba.slide import thrown
 from pmviewer.scene.formats.mitsuba.transform import Matrix, nearest_rotation
 from pmviewer.scene.formats.sky_image import read_sky
 
@@ -93,8 +94,10 @@ def _spot(p: Properties, name: str) -> list[Light]:
     beam = bounded(p, "beam_width", p.number("beam_width", BEAM * cutoff), 0.0, cutoff)
     intensity = p.bounded_colour("intensity", 1.0, None)
     if "texture" in p or p.objects("texture"):
-        p.document.warn(f"{p.element}: its texture is left out, it shines in the texture's mean colour.", p.element)
         found = [t for t in [p.texture("texture")] if t is not None] + p.unnamed_textures()
+        if found and (lights := thrown(p, name, found[0], intensity, cutoff, beam)) is not None:
+            return lights
+        p.document.warn(f"{p.element}: its texture is left out, it shines in the texture's mean colour.", p.element)
         if found:
             intensity = _times(intensity, found[0].mean)
     x, y, z = (float(c) for c in m[:3, 3])

@@ -37,7 +37,7 @@ def read_projector(p: Properties, name: str) -> list[Light]:
     fov, axis = field_of_view(p)
     height, width = picture.pixels.shape[:2] if isinstance(picture, Bitmap) else (1, 1)
     half = math.tan(math.radians(fov) / 2) * share_of_width(axis, width, height)
-    placed = _turned(p, m)
+    placed = turned(p, m)
     if placed is None:
         return []
     turn, (across, up, ahead) = placed
@@ -51,8 +51,9 @@ def read_projector(p: Properties, name: str) -> list[Light]:
     return [ProjectorLight(name, (x, y, z), turn, halves, pixels, columns, rows)]
 
 
-def _turned(p: Properties, m: Matrix) -> tuple[Matrix, Float] | None:
-    """Rotation or mirroring, and the scales along its axes; None with a warning where there is no such thing."""
+def turned(p: Properties, m: Matrix) -> tuple[Matrix, Float] | None:
+    """Rotation or mirroring of a light that throws a picture, and the scales along its axes; None with a warning where
+    there is no such thing."""
     lengths = np.linalg.norm(m[:3, :3], axis=0)
     if not lengths.min() > 1e-12 * lengths.max() > 0:
         p.document.warn(f"{p.element} has no direction to shine in: it is left out.", p.element)
