@@ -190,9 +190,9 @@ def test_the_window_does_not_wait_for_the_compiler():
 def test_the_window_is_given_scene_settings_threads_and_parameters(monkeypatch, tmp_path):
     given = {}
 
-    def run_viewer(scene, settings, threads, parameters, snapshots, cluster, make):
+    def run_viewer(scene, settings, threads, parameters, snapshots, cluster, make, chosen):
         given.update(scene=scene, N=settings.photons.N, threads=threads, parameters=dict(parameters))
-        given.update(snapshots=snapshots, cluster=cluster)
+        given.update(snapshots=snapshots, cluster=cluster, chosen=chosen)
         return 0
 
     monkeypatch.setattr("pmviewer.viewer.app.run_viewer", run_viewer)
@@ -201,5 +201,8 @@ def test_the_window_is_given_scene_settings_threads_and_parameters(monkeypatch, 
     options += ("--cluster", "local:2")
     assert call("a.xml", *options) == 0
     wanted = {"scene": "a.xml", "N": 7, "threads": 2, "parameters": {"res": "64"}}
-    assert given == wanted | {"snapshots": ((1, tmp_path / "a.exr"),), "cluster": "local:2"}
+    assert given == wanted | {"snapshots": ((1, tmp_path / "a.exr"),), "cluster": "local:2", "chosen": True}
+    for words, chosen in ((("--set", "photons.q=1"), True), (("--set", "camera.width=64"), False), ((), False)):
+        assert call("a.xml", *words) == 0
+        assert given["chosen"] is chosen, "a default that is given is a choice, too"
     assert call("a.xml", "--snapshot", str(tmp_path / "none.exr")) != 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -40,21 +39,19 @@ def view(
     """Open the window (the default command)."""
     from pmviewer.commands.job import load_job, with_snapshots
     from pmviewer.engine.cluster.address import check_address
-    from pmviewer.settings.access import with_values
     from pmviewer.settings.presets import RESET
 
     if cluster is not None:
         check_address(cluster)
 
     job = with_snapshots(load_job(scene, set_ or [], define or [], edit or []), snapshot or [])
-    if job.passes is not None or any(path.startswith(RESET) for path in job.told):  # somebody has chosen
-        job = replace(job, settings=with_values(job.settings, {"display.automatic": False}))
+    chosen = job.passes is not None or any(path.startswith(RESET) for path in job.told)
     try:
         from pmviewer.library.attaching.listening import attachable
         from pmviewer.viewer.app import ViewerApp, run_viewer
 
         make = attachable(ViewerApp, listen)
-        code = run_viewer(job.scene, job.settings, threads, job.parameters, job.snapshots, cluster, make)
+        code = run_viewer(job.scene, job.settings, threads, job.parameters, job.snapshots, cluster, make, chosen=chosen)
     except WindowError as error:
         typer.echo(f"{error}", err=True)
         target = Path(f"{Path(job.scene).stem}.png")

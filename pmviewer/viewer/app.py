@@ -287,15 +287,20 @@ def run_viewer(
     snapshots: Sequence[tuple[int, Path]] = (),
     cluster: str | None = None,
     make: Callable[..., ViewerApp] = ViewerApp,
+    *,
+    chosen: bool = False,
 ) -> int:
     """Open the window on a scene or session file (None: the Cornell box with a mirror and a glass sphere).
 
     `parameters` are values for the scene file's `<default>` names, `threads` the session's (None: all cores),
     `snapshots` numbers and files of pictures in the strip, `cluster` whose workers render the passes (None: this
-    process), `make` what makes the window.
+    process), `make` what makes the window, `chosen` whether somebody has chosen how that scene is rendered: it gets no
+    trial by itself then.
     Returns 0 when the window was closed, or ends the process, if the engine is busy then: files that the user has asked
     for are written by that time. Raises WindowError when there is no display or no OpenGL.
     """
     from pmviewer.viewer.start import start_viewer
 
-    return start_viewer(make, source, settings, threads, parameters, snapshots=snapshots, cluster=cluster, leave=True)
+    return start_viewer(
+        make, source, settings, threads, parameters, snapshots=snapshots, cluster=cluster, leave=True, chosen=chosen
+    )

@@ -104,6 +104,7 @@ def start_viewer(
     cluster: str | None = None,
     leave: bool = False,
     clicks: bool = True,
+    chosen: bool = False,
 ) -> int:
     """See `pmviewer.viewer.app.run_viewer`. With `leave` the process ends here when the window has closed while the
     engine is busy: a kernel that is being compiled can't be interrupted, and there is nothing of it to keep. Such a
@@ -115,7 +116,9 @@ def start_viewer(
     app = make_app(link, inactive_reason=_inactive_reason, autosaves=autosaves() if leave else None)
     background = app.state.background
     app.state.automatic.at_start = leave
-    app.state.open(source if source is not None else DEFAULT_SCENE, keep_camera=True, parameters=parameters)
+    app.state.open(
+        source if source is not None else DEFAULT_SCENE, keep_camera=True, parameters=parameters, chosen=chosen
+    )
     if snapshots:
         app.state.snapshots.open([path for _, path in snapshots], [number for number, _ in snapshots])
     app.params.callbacks.enqueue_post_init(lambda: link.connect(background))

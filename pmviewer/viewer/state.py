@@ -399,13 +399,14 @@ class ViewerState:
         scene: Path | None = None,
         kept: Path | None = None,
         remember: bool = True,
+        chosen: bool = False,
     ) -> None:
         """Open a scene or a session file, whose scene may lie elsewhere now (`scene`), and go on with the film that is
         `kept` in a checkpoint. Without `remember` it is the scene that is a recent file, not the session.
 
         Settings stay when it is a scene, but for the camera's: that was another scene's unless `keep_camera` says
         otherwise; and for what automatic mode picked, for another scene too. `parameters` are values for the scene
-        file's `<default>` names.
+        file's `<default>` names. What is in a session file, kept or `chosen` gets no trial by itself.
         """
         settings = (
             self.settings
@@ -439,7 +440,7 @@ class ViewerState:
                 )
             self.snapshots.open([file for _, file in snapshots], [number for number, _ in snapshots])
         self._opening, self._film = (str(path if remember else source), dict(parameters or {})), film
-        self.automatic.opening(chosen=kept is not None or str(path).lower().endswith(".toml"))
+        self.automatic.opening(chosen=chosen or kept is not None or str(path).lower().endswith(".toml"))
         self.session.open(source, settings, parameters, kept)
 
     def restore(self) -> None:
