@@ -156,7 +156,7 @@ class ViewerState:
                     parsed[path] = value
             if list(parsed) == ["camera.name"]:  # another camera as it is, not where this one was moved to
                 parsed |= dict.fromkeys(("camera.origin", "camera.target", "camera.up", "camera.fov"), "auto")
-            if parsed.get("render.method", self.settings.render.method) != self.settings.render.method:
+            if list(parsed) == ["render.method"] and parsed["render.method"] != self.settings.render.method:
                 parsed = self._without_automatic(parsed)
             if parsed.get("light.rig", self.settings.light.rig) != self.settings.light.rig:
                 parsed = self._without_light_edits(parsed)
@@ -169,8 +169,8 @@ class ViewerState:
             self.session.set(settings)
 
     def _without_automatic(self, values: dict[str, Any]) -> dict[str, Any]:
-        """Another method by hand: the numbers that automatic mode picked for the one before, radii first of all, would
-        make it look worse than it is."""
+        """Another method by hand, and nothing else: the numbers that automatic mode picked for the one before, radii
+        first of all, would make it look worse than it is."""
         own = {path: value for path, value in self.automatic.undone(self.settings).items() if path not in values}
         if own:
             names = ", ".join(own)

@@ -9,7 +9,9 @@ from pmviewer.bench.measures.error import reference
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.radius import seen_from
 from pmviewer.engine.renderer import Renderer
-from pmviewer.engine.stages.spread import MOST
+from pmviewer.engine.stages import spread
+from pmviewer.engine.stages.spread import FEW_TRACED, MOST, TRACED
+from pmviewer.engine.stages.tracer import Tracer
 from pmviewer.engine.store import StageStore
 from pmviewer.output.metric import relmse
 from pmviewer.scene.description import Camera, Parallelogram, PointLight, Scene, Shape
@@ -134,3 +136,15 @@ def test_a_cabin_is_no_longer_dots_on_black(pool):
             renderer.step()
         errors.append(relmse(renderer.frame(0).image(), target))
     assert errors[0] < 0.2 * errors[1]
+
+
+@pytest.mark.parametrize(("name", "few"), [("cornell_diffuse", True), ("cornell_caustic", True), ("door_slit", False)])
+def test_few_trajectories_are_enough_where_photons_lie_close(pool, monkeypatch, name, few):
+    """And tell the same radii; behind walls and where there are hardly any, more are traced."""
+    scene, traced = open_scene(name), []
+    trace = Tracer.trace
+    monkeypatch.setattr(Tracer, "trace", lambda self, index, N: traced.append(N) or trace(self, index, N))
+    radii = made(scene, pool).settled_radii
+    assert traced == ([FEW_TRACED] if few else [FEW_TRACED, TRACED])
+    monkeypatch.setattr(spread, "FEW_TRACED", TRACED)
+    assert made(scene, pool).settled_radii == radii
