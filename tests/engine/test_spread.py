@@ -148,3 +148,9 @@ def test_few_trajectories_are_enough_where_photons_lie_close(pool, monkeypatch, 
     assert traced == ([FEW_TRACED] if few else [FEW_TRACED, TRACED])
     monkeypatch.setattr(spread, "FEW_TRACED", TRACED)
     assert made(scene, pool).settled_radii == radii
+
+
+def test_radii_stay_when_one_of_three_glasses_moves(pool):
+    """Photons around the others are the same, and so are the look-ups that find them (T2)."""
+    moved = [made(open_scene("three_glasses", {"x": x}), pool).settled_radii for x in ("0", "0.0025", "0.01")]
+    assert moved[1:] == moved[:1] * 2
