@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -140,14 +142,16 @@ def test_a_cabin_is_no_longer_dots_on_black(pool):
 
 @pytest.mark.parametrize(("name", "few"), [("cornell_diffuse", True), ("cornell_caustic", True), ("door_slit", False)])
 def test_few_trajectories_are_enough_where_photons_lie_close(pool, monkeypatch, name, few):
-    """And tell the same radii; behind walls and where there are hardly any, more are traced."""
+    """And tell the same radii, or the next step's; behind walls and where there are hardly any, more are traced."""
     scene, traced = open_scene(name), []
     trace = Tracer.trace
     monkeypatch.setattr(Tracer, "trace", lambda self, index, N: traced.append(N) or trace(self, index, N))
     radii = made(scene, pool).settled_radii
     assert traced == ([FEW_TRACED] if few else [FEW_TRACED, TRACED])
     monkeypatch.setattr(spread, "FEW_TRACED", TRACED)
-    assert made(scene, pool).settled_radii == radii
+    by_all = made(scene, pool).settled_radii
+    assert (radii.usual, radii.global_) == (by_all.usual, by_all.global_)
+    assert abs(math.log2(radii.caustic / by_all.caustic)) < 0.26
 
 
 def test_radii_stay_when_one_of_three_glasses_moves(pool):

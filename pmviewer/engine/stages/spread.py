@@ -56,8 +56,8 @@ TRACED = 40_000
 """Trajectories, as many as a first coarse picture has."""
 FEW_TRACED, PLAIN, FEWEST_PLACES, BEHIND = 5_000, 1.5, 64, 0.1
 """Trajectories that are enough where they tell that photons lie close: radii of so many times the usual ones at most,
-from so many places, walls near this share of them. Of eighteen scenes all have the radii that the larger number tells;
-six need no more, and begin 16 ms of CPU time sooner."""
+from so many places, walls near this share of them. Of eighteen scenes seven need no more and begin 16 ms of CPU time
+sooner, with the radii that the larger number tells, or a step of them wider."""
 NEAREST = 4
 """Photons that are looked at around each place."""
 LEAKING = 0.3
