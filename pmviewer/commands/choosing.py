@@ -9,12 +9,12 @@ from typing import Any
 from pmviewer.commands.job import Job, Stop
 from pmviewer.commands.progress_bar import progress_bar
 from pmviewer.engine.auto.bias import Bias
-from pmviewer.engine.auto.candidates import given
 from pmviewer.engine.auto.choose import Goal, choose
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.errors import SettingError
 from pmviewer.settings.access import Settings, with_values
+from pmviewer.settings.presets import given
 
 LEAST_LEFT = 0.5
 """Share of the time asked for that is rendered whatever the trial took."""

@@ -39,13 +39,13 @@ def view(
     """Open the window (the default command)."""
     from pmviewer.commands.job import load_job, with_snapshots
     from pmviewer.engine.cluster.address import check_address
-    from pmviewer.settings.presets import RESET
+    from pmviewer.settings.presets import given
 
     if cluster is not None:
         check_address(cluster)
 
     job = with_snapshots(load_job(scene, set_ or [], define or [], edit or []), snapshot or [])
-    chosen = job.passes is not None or any(path.startswith(RESET) for path in job.told)
+    chosen = job.passes is not None or bool(given(job.settings, job.told))
     try:
         from pmviewer.library.attaching.listening import attachable
         from pmviewer.viewer.app import ViewerApp, run_viewer

@@ -31,12 +31,13 @@ from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.radius import NO_RADII, FirstRadii
 from pmviewer.engine.stages.eye import gather_rays_of, marks_of, render_into
+from pmviewer.engine.stages.first_photons import TRACED
 from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.engine.stages.light import LightStage
 from pmviewer.engine.stages.pass_data import RenderedPass
 from pmviewer.engine.stages.pass_maps import Carried
 from pmviewer.engine.stages.pass_stages import MadeAhead, PassStages
-from pmviewer.engine.stages.spread import TRACED, radii_of_first_pass
+from pmviewer.engine.stages.spread import radii_of_first_pass
 from pmviewer.engine.stages.virtual_lights import film_of
 from pmviewer.engine.store import StageStore
 from pmviewer.engine.tally import Tally

@@ -5,11 +5,11 @@ A preset sets all of RESET: what it doesn't name has its default. Camera, displa
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pmviewer.settings.access import SETTINGS
+from pmviewer.settings.access import SETTINGS, Settings, get
 
 RESET = (
     "photons.",
@@ -29,6 +29,20 @@ RESET = (
 """What a preset sets, by the beginnings of names."""
 
 
+def assignments(values: Mapping[str, Any]) -> dict[str, Any]:
+    """All that a preset or automatic mode sets, by full name: `values`, and the defaults of the rest."""
+    return {path: info.default for path, info in SETTINGS.items() if path.startswith(RESET)} | dict(values)
+
+
+def given(settings: Settings, told: Collection[str] = ()) -> list[str]:
+    """Settings of these that somebody has changed already or has `told`, by full name."""
+    return [
+        path
+        for path, info in SETTINGS.items()
+        if path.startswith(RESET) and (path in told or get(settings, path) != info.default)
+    ]
+
+
 @dataclass(frozen=True)
 class Preset:
     """`values` by full name, beside the defaults."""
@@ -39,7 +53,7 @@ class Preset:
 
     def assignments(self) -> dict[str, Any]:
         """All that it sets, by full name."""
-        return {path: info.default for path, info in SETTINGS.items() if path.startswith(RESET)} | dict(self.values)
+        return assignments(self.values)
 
 
 PRESETS: tuple[Preset, ...] = (

@@ -17,6 +17,7 @@ from pmviewer.engine.frame import Level
 from pmviewer.errors import PmviewerError
 from pmviewer.progress import check
 from pmviewer.settings.access import Settings, get, with_values
+from pmviewer.settings.presets import given
 from pmviewer.viewer.background import CHOOSING, Background, Work
 from pmviewer.viewer.session_link import SessionLike
 
@@ -135,8 +136,6 @@ class AutomaticRun:
         opened, frame, settings = self._session.opened_scene, self._session.frame, self._session.settings
         if opened is None or frame is None or frame.coarse or frame.statistics.passes < SEEN:
             return
-        from pmviewer.engine.auto.candidates import given
-
         state = self._session.status.state
         if state in ("finished", "failed") or not settings.display.automatic or given(settings):
             self._expected = False

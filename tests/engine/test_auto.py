@@ -21,9 +21,7 @@ from pmviewer.engine.auto.candidates import (
     SHOWN,
     THICKER,
     Candidate,
-    assignments,
     candidates,
-    given,
 )
 from pmviewer.engine.auto.choose import Goal, _adapts, _by_time, _picked, _values, choose
 from pmviewer.engine.auto.estimate import ErrorEstimate
@@ -38,6 +36,7 @@ from pmviewer.engine.store import StageStore
 from pmviewer.maps.radius import progressive_radius
 from pmviewer.scene.analysis import SceneTraits
 from pmviewer.settings.access import SETTINGS, Settings, flat, with_values
+from pmviewer.settings.presets import assignments, given
 from pmviewer.state import State
 
 RADII = FirstRadii(0.02, 0.02, 0.01)

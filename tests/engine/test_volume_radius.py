@@ -10,7 +10,8 @@ import pytest
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.radius import FREE_PATHS, NO_RADII, FirstRadii, free_paths, mean_radii, volume_radius
 from pmviewer.engine.renderer import Renderer
-from pmviewer.engine.stages.spread import MOST_PATHS, TRACED, paths_for
+from pmviewer.engine.stages.first_photons import TRACED
+from pmviewer.engine.stages.free_paths import MOST_PATHS, paths_for
 from pmviewer.engine.store import StageStore
 from pmviewer.scene.grid import Grid
 from pmviewer.scene.medium import Medium

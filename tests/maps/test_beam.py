@@ -11,7 +11,7 @@ from pmviewer.kernels.compile.jit import kernel
 from pmviewer.maps.estimate.beam import Beam, beam_radiance
 from pmviewer.maps.search.grid import build_grid
 from pmviewer.maps.search.simd import beside8
-from pmviewer.render.media.ends import ALONG
+from pmviewer.render.media.beams import ALONG
 from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.medium import Medium
 from tests.render.test_media import SKY, cube_of

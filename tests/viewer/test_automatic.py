@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import pytest
 from imgui_bundle import icons_fontawesome_6 as fa
 
-from pmviewer.engine.auto.candidates import assignments, given
 from pmviewer.engine.frame import Status
 from pmviewer.settings.access import SETTINGS, Settings, get, with_values
+from pmviewer.settings.presets import assignments, given
 from pmviewer.viewer.automatic import AutomaticRun
 from tests.viewer.driver import app_on_engine, drive, finished, wait_until
 from tests.viewer.fake_session import FakeSession
@@ -74,7 +74,7 @@ def test_another_scene_has_the_own_settings_again_and_a_trial_of_its_own(app, mo
         app.state.change({"render.passes": 100_000, "photons.N": SETTINGS["photons.N"].default})
         for times, scene in enumerate(("cornell_diffuse", "corner_room"), 1):
             app.state.open(scene, keep_camera=True)
-            wait_until(c, lambda: sum(m.text.startswith("automatic: ") for m in app.state.log) == times)  # noqa: B023
+            wait_until(c, lambda times=times: sum(m.text.startswith("automatic: ") for m in app.state.log) == times)
             c.yield_(2)
             picked.append(given(app.state.settings))
 

@@ -60,9 +60,12 @@ CHOSEN_WITH = ("ring_caustic", "cornell_caustic")
 ROULETTE = "; photons' roulette was chosen with this scene among others"
 ROULETTE_WITH = ("cornell_caustic", "cornell_diffuse", "rooms_10x10")
 """Scenes by which CHANNEL_ROULETTE of `pmviewer.engine.auto.candidates` was chosen, likewise."""
-HELD = "; how many photons look-ups of maps that are shown hold at first was chosen with this scene among others"
-HELD_WITH = ("cornell_caustic", "rooms_10x10")
-"""HELD and CAUSTIC_HELD of `pmviewer.engine.stages.spread`, likewise."""
+HELD = (
+    "; how many photons look-ups of maps that are shown hold at first, and how few trajectories tell it, was chosen "
+    "with this scene among others"
+)
+HELD_WITH = ("cornell_diffuse", "cornell_caustic", "ring_caustic", "rooms_10x10")
+"""HELD, CAUSTIC_HELD and FEW_TRACED of `pmviewer.engine.stages.spread`, likewise."""
 FALL = "; how noise is taken to fall was chosen with this scene among others"
 FALL_WITH = ("cornell_caustic", "rooms_10x10")
 """Scenes by which the powers of `pmviewer.engine.auto.model` and `measured` were chosen, likewise."""
@@ -218,8 +221,8 @@ def run(quick: bool = False) -> BenchResult:
             apart += CHOSEN if scene in CHOSEN_WITH else ""
             apart += ROULETTE if scene in ROULETTE_WITH else ""
             apart += FALL if scene in FALL_WITH else ""
-            apart += HELD if scene in HELD_WITH else ""
         note = f"{scene} to relMSE {error:g}, best: {best.method}{apart}"
+        note += HELD if scene in HELD_WITH else ""
         targets.append(Target(target, best.time_to(error), bound, "CPU s", False, note))
     if peers:
         targets += against_peer(curves, peers)

@@ -37,6 +37,8 @@ PHOTONS = 60_000
 PASSES = 4
 STORE_BYTES = 64 << 20
 BOUND = 1.02
+FEW = "how few trajectories tell radii was chosen with this scene among others"
+"""FEW_TRACED of `pmviewer.engine.stages.spread`."""
 EXACT = 0.004
 """The median's standard error at which a scene is done."""
 FEWEST, MOST = 15, 150
@@ -207,7 +209,7 @@ def run(quick: bool = False) -> BenchResult:
             ratio, error, pairs, seconds = median_ratio(came, stripped, 8.0 if quick else 40.0)
             extra = set(came.opened.flat.record.dtype.names or ()) - set(stripped.opened.flat.record.dtype.names or ())
             rows.append([name, 1000 * seconds, f"{ratio:.4f}", f"{error:.4f}", pairs, len(extra), same])
-            note = f"CPU time as it comes over stripped by hand, {name}, ± {error:.4f}"
+            note = f"CPU time as it comes over stripped by hand, {name}, ± {error:.4f}; {FEW}"
             print(f"{name}: {ratio:.4f} ± {error:.4f} of {pairs} pairs", file=sys.stderr, flush=True)
             if not same:
                 note += "; the pictures differ, so that the times don't compare"

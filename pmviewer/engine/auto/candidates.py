@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 from pmviewer.engine.method import MANY_LIGHTS, REFLECTING, thin_rules
 from pmviewer.scene.analysis import SceneTraits
-from pmviewer.settings.access import SETTINGS, Settings, get, with_values
-from pmviewer.settings.presets import RESET
+from pmviewer.settings.access import Settings, with_values
 
 GUIDED_FROM = 100.0
 """CPU seconds from which guided emission is worth its trial: its first passes are the dearest."""
@@ -94,20 +93,6 @@ wrong by 0.018 (squared, relative; 0.008 with usual ones), with second gathers b
 discs."""
 PATH = Candidate("path", {"render.method": "path"})
 GUIDED = {"importance.map": "average", "importance.emission": "Christensen keep", **CHANNEL_ROULETTE}
-
-
-def assignments(values: Mapping[str, Any]) -> dict[str, Any]:
-    """All that automatic mode sets, by full name: `values`, and the default of everything else that presets set."""
-    return {path: info.default for path, info in SETTINGS.items() if path.startswith(RESET)} | dict(values)
-
-
-def given(settings: Settings, told: Collection[str] = ()) -> list[str]:
-    """Settings that automatic mode would set and that somebody has changed already or has `told`, by full name."""
-    return [
-        path
-        for path, info in SETTINGS.items()
-        if path.startswith(RESET) and (path in told or get(settings, path) != info.default)
-    ]
 
 
 def candidates(

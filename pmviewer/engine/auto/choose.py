@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from pmviewer.engine.auto.bias import Bias, way_of
-from pmviewer.engine.auto.candidates import CACHE, PROGRESSIVE, SHOWN, Candidate, assignments, candidates
+from pmviewer.engine.auto.candidates import CACHE, PROGRESSIVE, SHOWN, Candidate, candidates
 from pmviewer.engine.auto.measured import Measured, Numbers, Trial, Widths
 from pmviewer.engine.auto.model import BETTER, FEWEST, Option, bias_of, in_time, numbers_for, to_error
 from pmviewer.engine.auto.runs import TooDearError
@@ -20,6 +20,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.render.adaptive import DECIDED_AFTER, WORTH
 from pmviewer.render.camera import resolve_camera
 from pmviewer.settings.access import SETTINGS, Settings, with_values
+from pmviewer.settings.presets import assignments
 
 SHARE, MOST_SHARE = 0.1, 0.3
 """Of the time asked for, what a trial is planned to take, and what it may: where rays go to and fro between mirrors and

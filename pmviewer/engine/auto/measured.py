@@ -33,9 +33,7 @@ class Widths:
         """The settings that they stand for, where the automatic radii are these, relative to the scene."""
         if self.alike:
             return {}
-        wide = FirstRadii(
-            self.shown * first.usual, self.shown * first.global_, self.caustic * first.caustic
-        )  # not media
+        wide = FirstRadii(self.shown * first.usual, self.shown * first.global_, self.caustic * first.caustic)
         found = wide.values(settings.estimate)
         if self.shown == 1.0:  # the radius stays automatic, and that of caustics goes with the usual one
             found = {"estimate.caustic_radius": within("estimate.caustic_radius", wide.caustic / first.usual)}

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from pmviewer.engine.auto.candidates import assignments, candidates
+from pmviewer.engine.auto.candidates import candidates
 from pmviewer.engine.auto.choose import USUAL
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.prepare import steps_of
 from pmviewer.settings.access import Settings, with_values
+from pmviewer.settings.presets import assignments
 
 
 def ways(opened: OpenScene, settings: Settings) -> list[Settings]:

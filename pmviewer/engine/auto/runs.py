@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pmviewer.engine.auto.candidates import GATHER, Candidate, assignments
+from pmviewer.engine.auto.candidates import GATHER, Candidate
 from pmviewer.engine.auto.measured import Trial, Widths
 from pmviewer.engine.auto.relative import F8
 from pmviewer.engine.auto.size import FEWEST_PHOTONS, OF_DEAREST, PROBED, Size, fitted
@@ -25,6 +25,7 @@ from pmviewer.render.camera import resolve_camera
 from pmviewer.render.filter import filter_of, noise_share
 from pmviewer.render.planes import PLANES, beauty_of
 from pmviewer.settings.access import Settings, with_values
+from pmviewer.settings.presets import assignments
 
 FEWER = 4
 """Photons of the larger trial pass over those of the smaller one."""

@@ -8,15 +8,10 @@ behind a wall, and its light would leak. relMSE after 3 CPU seconds with global 
 that with the usual ones: office 0.33, 0.19; rooms_10x10 0.30, 0.19; skylight_room 0.40, 0.34; colonnade 0.47, 0.58;
 door_slit, whose door leaks, 0.42, 1.35. Of caustics, after 4: car_cabin 0.23, 0.08; cognac 0.65, 0.60; three_glasses
 0.70, 0.73; cornell_glossy 0.78, 0.80; cornell_caustic 0.94, 2.1; three_balls 1.03, 1.43.
-
-In media it is a share of the free path that bounds look-ups, half of one, which is next to nothing in wax or milk: a
-pixel there has no photon for minutes. Beams go up to two free paths where there are few; their discs lie along the
-boundary (`pmviewer.maps.estimate.beam`).
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,36 +19,28 @@ from numpy.typing import NDArray
 
 from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
-from pmviewer.engine.radius import FREE_PATHS, FirstRadii, first_radius, rounded, seen_from
+from pmviewer.engine.radius import FirstRadii, first_radius, rounded, seen_from
+from pmviewer.engine.stages.first_photons import TRACED, traced
+from pmviewer.engine.stages.free_paths import free_paths
 from pmviewer.engine.stages.light_maps import of_classes
-from pmviewer.engine.stages.projection import projection_for
-from pmviewer.engine.stages.tracer import Tracer
 from pmviewer.engine.store import StageStore
-from pmviewer.photons.light_pass.photon_maps import PhotonMaps
 from pmviewer.render.camera import CameraPose
 from pmviewer.render.closest_hits import closest_hits
 from pmviewer.render.mirrored import mark_mirrors, mirrors_of
 from pmviewer.scene.arrays.flatten import FlatScene
-from pmviewer.settings.access import SETTINGS, Settings, with_values
+from pmviewer.settings.access import SETTINGS, Settings
 from pmviewer.tasks import Runner
 
 HELD, CAUSTIC_HELD = 8, 4
 """Photons of a pass of the default N that look-ups hold in half of the places, and those of caustics around half of
 their photons: these lie where their light is bright, and its outlines are sharp. Both are smaller than what was best
 after 3 and 4 seconds in most of the scenes above, as the bias stays for long."""
-HELD_IN_MEDIA, MOST_PATHS = 32, 2.0
-"""Photons of a pass of the default N that a beam as long as a free path holds in half of the places where photons are,
-and the most free paths that its radius is: two cost 0.3 % of a wax bunny's light, four 2 %."""
-MOST_COUNTED = 50_000
-"""Photons in media that are counted for that, spread over all of them."""
 MOST = 32.0
 """Times the usual radius."""
 LARGEST = 0.1
 """Radius relative to the scene."""
 CAUSTIC_SHARE = 0.5
 """Radius of look-ups of caustics, relative to the usual one."""
-TRACED = 40_000
-"""Trajectories, as many as a first coarse picture has."""
 FEW_TRACED, PLAIN, FEWEST_PLACES, BEHIND = 5_000, 1.5, 64, 0.1
 """Trajectories that are enough where they tell that photons lie close: radii of so many times the usual ones at most,
 from so many places, walls near this share of them. Of eighteen scenes seven need no more and begin 16 ms of CPU time
@@ -78,7 +65,7 @@ def radii_of_first_pass(
     estimate, flat = settings.estimate, scene.flat
     paths = 0.0
     if plan.volume and estimate.free_paths == "auto":
-        paths = _paths(scene, settings, plan, run, store)
+        paths = free_paths(scene, settings, plan, run, store)
     usual = first_radius(flat, camera, estimate, plan.gather)
     asked = estimate.caustic_radius
     caustic = usual * (CAUSTIC_SHARE if asked == "auto" else asked)
@@ -89,66 +76,20 @@ def radii_of_first_pass(
     if not (shown or looked_up):
         return FirstRadii(usual, usual, caustic, paths)
     for count in (FEW_TRACED, TRACED):
-        photons = _traced(scene, settings, plan, run, store, count)
-        seen = around = UNKNOWN
+        photons = traced(scene, settings, plan, run, store, count)
+        seen = around = NOT_ASKED
         if shown:
             seen = _seen(scene, camera, settings, of_classes(photons.global_, shown)[:, :3], count)
         if looked_up:
             around = _around(camera, of_classes(photons.caustic, looked_up)[:, :3], count)
-        if seen.is_plain(usual, bool(shown)) and around.is_plain(caustic, bool(looked_up)):
+        if seen.is_plain(usual) and around.is_plain(caustic):
             break
     return FirstRadii(usual, _widened(usual, seen.radius, flat), _widened(caustic, around.radius, flat), paths)
-
-
-def _paths(scene: OpenScene, settings: Settings, plan: Plan, run: Runner, store: StageStore) -> float:
-    """Free paths that the radius of look-ups in media is at most."""
-    media = [medium for medium in scene.scene.media if max(medium.albedo) > 0]
-    path = min((medium.free_path for medium in media), default=math.inf)
-    if settings.estimate.in_media != "beam" or not all(math.isfinite(medium.free_path) for medium in media):
-        return FREE_PATHS
-    key = "free paths", *_tracer(scene, settings, plan, run).key(scene.uid, 0, TRACED, False)
-    found: float = store.get(
-        key, lambda: paths_for(_traced(scene, settings, plan, run, store).volume, path), lambda _: 0
-    )
-    return found
-
-
-def paths_for(photons: NDArray[np.float32], path: float) -> float:
-    """The same for photons (n, 6) of TRACED trajectories where free paths are that long, in scene units."""
-    side, step = 2.0 * path, -(-len(photons) // MOST_COUNTED) or 1
-    photons = photons[::step]
-    x, y, z = np.floor(photons[:, :3].T.astype(np.float64) / side).astype(np.int64)
-    cells = (x * 73856093) ^ (y * 19349663) ^ (z * 83492791)  # few share one (Teschner et al. 2003)
-    _, cell, counts = np.unique(cells, return_inverse=True, return_counts=True)
-    beside = np.median(counts[cell] - 1.0) if len(photons) else 0.0
-    density = step * beside / side**3 * SETTINGS["photons.N"].default / TRACED
-    if not density > 0:
-        return MOST_PATHS
-    return rounded(min(max(math.sqrt(HELD_IN_MEDIA / (math.pi * density * path)) / path, FREE_PATHS), MOST_PATHS))
 
 
 def _widened(usual: float, wanted: float, flat: FlatScene) -> float:
     """The wanted radius in steps, no narrower than the usual one and within bounds."""
     return usual * rounded(min(max(wanted / usual, 1.0), MOST, max(LARGEST * flat.radius / usual, 1.0)))
-
-
-def _tracer(scene: OpenScene, settings: Settings, plan: Plan, run: Runner) -> Tracer:
-    """With the default N, q and seed."""
-    default = {name: SETTINGS[name].default for name in ("photons.N", "photons.q", "render.seed")}
-    tried = with_values(settings, default)
-    return Tracer(scene.flat, tried, plan, projection_for(scene, tried), run)
-
-
-def _traced(
-    scene: OpenScene, settings: Settings, plan: Plan, run: Runner, store: StageStore, count: int = TRACED
-) -> PhotonMaps:
-    """Photons of the first trajectories, all of which fill the global map."""
-    tracer = _tracer(scene, settings, plan, run)
-    return store.get(
-        tracer.key(scene.uid, 0, count, False),
-        lambda: tracer.trace(0, count),
-        lambda made: made.bytes,
-    )
 
 
 @dataclass(frozen=True)
@@ -160,13 +101,12 @@ class Wanted:
     places: int
     behind: float = 0.0
 
-    def is_plain(self, usual: float, asked: bool) -> bool:
-        """Whether more photons would tell hardly anything else; so it is where it isn't `asked` for."""
-        enough = self.places >= FEWEST_PLACES and self.behind <= BEHIND
-        return not asked or (enough and self.radius <= PLAIN * usual)
+    def is_plain(self, usual: float) -> bool:
+        """Whether more photons would tell hardly anything else."""
+        return self.places >= FEWEST_PLACES and self.behind <= BEHIND and self.radius <= PLAIN * usual
 
 
-UNKNOWN = Wanted(0.0, 0)
+UNKNOWN, NOT_ASKED = Wanted(0.0, 0), Wanted(0.0, FEWEST_PLACES)
 
 
 def _around(camera: CameraPose, photons: NDArray[np.float32], traced: int) -> Wanted:

@@ -15,7 +15,7 @@ from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.vector import along
 from pmviewer.maps.estimate.beam import beam_radiance
 from pmviewer.render.cast import cast
-from pmviewer.render.media.ends import beam_of
+from pmviewer.render.media.beams import beam_of
 from pmviewer.render.media.through import next_boundary, next_stretch
 from pmviewer.render.media.volume import radius_in
 from pmviewer.render.pixel import camera_ray

@@ -30,9 +30,9 @@ from pmviewer.render.counts import C_RAYS, C_SHADOW_RAYS
 from pmviewer.render.direct.choice import LIST_WORDS, choose_by_power, chosen_light
 from pmviewer.render.direct.direct import found_light
 from pmviewer.render.given import Sampler
+from pmviewer.render.media.beams import seen_beam_of
 from pmviewer.render.media.distance import distance_in, distance_pdf, equiangular_distance, equiangular_pdf
 from pmviewer.render.media.emitted import emitted_in, emitted_nearby
-from pmviewer.render.media.ends import seen_beam_of
 from pmviewer.render.media.march import marched_radiance, marches
 from pmviewer.render.media.phase_light import one_light_sample
 from pmviewer.render.media.through import next_stretch, way_through

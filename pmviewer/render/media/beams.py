@@ -1,5 +1,5 @@
-"""The discs in which photons around a stretch of a ray are looked up, by the surfaces at its ends; and how far a dense
-medium is looked into."""
+"""The Beam (`pmviewer.maps.estimate.beam`) of a stretch of a ray: the discs in which photons around it are looked up,
+by the surfaces at its ends, and how deep it goes in a dense medium."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ALONG = _f4(4.0)
 """Radii from an end up to which discs lie along its surface: upright ones reach it from 3.2 at that cosine."""
 SURE, FALL = _f4(0.25), _f4(0.08)
 """Share of the depth that anything shows through which is always looked at, 6 free paths, and that in which the chance
-to look at what lies behind falls to 1/e, 2 free paths: exp(−6) of the light is left there."""
+to look at what lies behind falls to 1/e, 1.9 free paths: exp(−6) of the light is left there."""
 
 
 @device
@@ -39,7 +39,7 @@ def beam_of(scene, o, d, length, radius):
 @device
 def seen_beam_of(scene, medium, o, d, length, radius, u):
     """The same as deep as light comes from, by a random number u: a medium is dense where its free paths are few in the
-    length, and most of what lies behind six of them would be looked up for nothing."""
+    length, and most of what lies behind six would be looked up for nothing."""
     deepest = way_seen(scene, medium)
     if not deepest < _INF:
         return beam_of(scene, o, d, length, radius)
