@@ -15,7 +15,7 @@ from pmviewer.engine.auto.candidates import (
     THICKER,
 )
 from pmviewer.engine.auto.measured import Numbers
-from pmviewer.engine.auto.relative import difference, squared, variance
+from pmviewer.engine.auto.relative import difference, shown_squared, squared, variance
 from pmviewer.engine.auto.runs import Trier
 from pmviewer.engine.auto.trial import RARE, trial
 from pmviewer.engine.auto.widths import HIDDEN, Tried, told_by
@@ -59,8 +59,7 @@ def test_radii_are_told_by_passes_with_others(kind, seeds):
         images = [blurred(width) + e + p / width for e, p in zip(camera, photons, strict=True)]
         return Tried(images, 0.1 + 0.01 * width**2)
 
-    mean = np.full(truth.shape, 0.8)
-    found = told_by(tried(2.0), tried(1.0), tried(0.5), mean)
+    found = told_by(tried(2.0), tried(1.0), tried(0.5), np.full(truth.shape, 0.64))
     assert found.blur.wider(2.0).bias2 - found.blur.bias2 == pytest.approx(bias2(2.0) - bias2(1.0), rel=0.1)
     assert found.blur.bias2 == pytest.approx(bias2(1.0), rel=0.2)
     assert found.variance == pytest.approx(0.01**2 / (0.64 + EPSILON), rel=0.15)
@@ -76,7 +75,7 @@ def test_a_wide_radius_is_not_free_of_bias_because_noise_hides_it(noise, expecte
     def tried(width: float) -> Tried:
         return Tried([0.8 + rng.normal(0, noise, (40, 40, 3)) for _ in range(2)], 0.1)
 
-    found = told_by(tried(2.0), tried(1.0), tried(0.5), np.full((40, 40, 3), 0.8), HIDDEN)
+    found = told_by(tried(2.0), tried(1.0), tried(0.5), np.full((40, 40, 3), 0.64), HIDDEN)
     if expected == "hidden":
         assert found.blur.wider(2.0).bias2 - found.blur.bias2 > 1.5 * HIDDEN
     else:
@@ -162,12 +161,24 @@ def test_a_trial_tells_what_light_samples_do(pool):
                 renderer = Renderer(scene, with_values(settings, values), pool, StageStore(0))
                 renderer.step()
                 images.append(beauty_of(renderer.film.planes()).astype(float))
-            noise.append(variance(images, np.mean(images, axis=0)))
+            noise.append(variance(images, np.mean(images, axis=0) ** 2))
         told = 0.75 * tried.measured[0].direct
         print(f"{name}: noise {noise[0]:.4f}, {noise[1]:.4f} with four times the samples; the trial: {told:.4f} less")
         assert told == pytest.approx(noise[0] - noise[1], rel=0.35)
         assert told > least * noise[0]
         assert tried.measured[0].costs.sampled > 0
+
+
+@pytest.mark.parametrize("seeds", [2, 4])
+@pytest.mark.parametrize(("bright", "least"), [(0.2, 0.9), (2.0, 0.7), (20.0, 0.3)])
+def test_a_few_seeds_see_the_noise_of_rare_bright_pixels(seeds, bright, least):
+    """One pixel of a hundred is brighter by so much, each time another. Relative to what it shows itself, which is
+    bright with it, the variance of a pixel would be 2 at most with two seeds: less than a tenth of what there is."""
+    rng = np.random.default_rng(seeds)
+    chance = 0.01
+    images = [1 - chance * bright + bright * (rng.random((100, 100, 1)) < chance) * np.ones(3) for _ in range(seeds)]
+    true = chance * (1 - chance) * bright**2 / (1 + EPSILON)
+    assert least * true < variance(images, shown_squared(images)) < 1.3 * true
 
 
 @pytest.mark.parametrize("seeds", [2, 4, 6])

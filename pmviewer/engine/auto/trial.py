@@ -20,7 +20,7 @@ import numpy as np
 from pmviewer.engine.auto.bias import GATHERED_ORDER, Bias, Blur
 from pmviewer.engine.auto.candidates import FARTHER, FARTHER_NAME, GATHER, LESS_BIAS, MORE_COST, Candidate
 from pmviewer.engine.auto.measured import BY_PHOTONS, BY_POWER, Costs, Measured, Trial
-from pmviewer.engine.auto.relative import F8, squared, variance
+from pmviewer.engine.auto.relative import F8, shown_squared, squared, variance
 from pmviewer.engine.auto.runs import MORE, SEEDS, Attempt, Run, Trier
 from pmviewer.engine.auto.widths import HIDDEN, NONE, WIDER, Tried, Widened, told_by
 from pmviewer.engine.opened import OpenScene
@@ -73,7 +73,8 @@ def trial(
             trier.render(tried, seeds)
     result = replace(trier.spent, pixels=trier.pixels, seeds=len(every[0].runs[0].images))
     covered = _covered(opened, trier.settings_of(every[0].candidate))
-    mean = np.mean([image for tried in every for run in tried.runs for image in run.images], axis=0)
+    pictures = [np.mean(images, axis=0) for images in zip(*(run.images for t in every for run in t.runs), strict=True)]
+    mean, square = np.mean(pictures, axis=0), shown_squared(pictures)
     gathers = next((tried for tried in every if tried.candidate.is_like(GATHER)), None)
     at_ends = _at_ends(gathers, mean) if gathers is not None else Blur()
     with_samples = next((tried for tried in every if tried.direct), None)
@@ -83,14 +84,14 @@ def trial(
         if tried.plan.cache and gathers is not None:
             interpolated = squared(tried.runs[0].images, gathers.runs[0].images, mean, BLOCK)
         source = tried if tried.caustic or not tried.plan.caustic_mask else with_caustics
-        caustic = _widened(source, "caustic", mean, trier.scale, 0.0) if source is not None else NONE
+        caustic = _widened(source, "caustic", square, trier.scale, 0.0) if source is not None else NONE
         if source is not None:
             caustic = caustic.wider(tried.first.caustic / source.first.caustic)
-        shown = _widened(tried, "shown", mean, trier.scale, HIDDEN)
+        shown = _widened(tried, "shown", square, trier.scale, HIDDEN)
         bias = Bias(caustic.blur, shown.blur, interpolated, gathered=at_ends if tried.plan.gather else Blur())
-        measured = _measured(tried, (caustic, shown), bias, mean, trier.scale)
+        measured = _measured(tried, (caustic, shown), bias, square, trier.scale)
         if tried.plan.direct and with_samples is not None:
-            measured = _sampled(measured, with_samples, mean, trier.scale)
+            measured = _sampled(measured, with_samples, square, trier.scale)
         measured = measured.shared(trier.kept)
         result.measured.append(replace(measured, covered=covered if _aims(tried) else 0.0))
         if tried is gathers and at_ends.bias2 > 0 and "gather.secondary" in tried.candidate.values:
@@ -114,14 +115,14 @@ def _covered(opened: OpenScene, settings: Settings) -> float:
     return min(made.caustic_power / made.surface_power, 1.0) if made is not None else 1.0
 
 
-def _widened(tried: Attempt, name: str, mean: F8, scale: float, hidden: float) -> Widened:
+def _widened(tried: Attempt, name: str, square: F8, scale: float, hidden: float) -> Widened:
     """What passes with other radii of that name tell; nothing without them. hidden: as for `told_by`."""
     runs: list[Run] = getattr(tried, name)
     if not runs:
         return NONE
     wide, narrow = (Tried(run.images, run.stages.get("camera pass", 0.0)) for run in runs)
     usual = Tried(tried.runs[0].images, 0.0)
-    found = told_by(wide, usual, narrow, mean, hidden)
+    found = told_by(wide, usual, narrow, square, hidden)
     N = tried.runs[0].N
     return replace(found, variance=found.variance * N, cost=found.cost * scale / N)
 
@@ -133,10 +134,10 @@ def _at_ends(gathers: Attempt, mean: F8) -> Blur:
     return Blur(more / (WIDER**GATHERED_ORDER - 1) ** 2, GATHERED_ORDER)
 
 
-def _of_photons(tried: Attempt, pictures: Callable[[Run], list[F8]], mean: F8) -> float:
+def _of_photons(tried: Attempt, pictures: Callable[[Run], list[F8]], square: F8) -> float:
     """Variance that the photons of one trajectory make in such pictures, from passes with fewer of them."""
     many, few = tried.runs
-    more = variance(pictures(few), mean) - variance(pictures(many), mean)
+    more = variance(pictures(few), square) - variance(pictures(many), square)
     return max(more, 0.0) / (1 / few.N - 1 / many.N)
 
 
@@ -151,16 +152,16 @@ def _farther(gather: Measured) -> Measured:
     )
 
 
-def _measured(tried: Attempt, widened: tuple[Widened, Widened], bias: Bias, mean: F8, scale: float) -> Measured:
-    variances = [variance(run.images, mean) for run in tried.runs]
+def _measured(tried: Attempt, widened: tuple[Widened, Widened], bias: Bias, square: F8, scale: float) -> Measured:
+    variances = [variance(run.images, square) for run in tried.runs]
     caustic, shown = (part.variance for part in widened)
     eye, gathered = variances[0], 0.0
     if len(tried.runs) > 1:
         many = tried.runs[0]
         told = caustic + shown
         if tried.spread:  # rare caustics' radii say more of them than fewer photons do, and would leave nothing
-            told += _of_photons(tried, lambda run: run.brought, mean)
-        photons = _of_photons(tried, lambda run: run.looked_up, mean)
+            told += _of_photons(tried, lambda run: run.brought, square)
+        photons = _of_photons(tried, lambda run: run.looked_up, square)
         photons = min(max(photons, told), variances[0] * many.N)
         eye = variances[0] - photons / many.N
         fitting = min(1.0, photons / told) if told > 0 else 1.0
@@ -170,12 +171,12 @@ def _measured(tried: Attempt, widened: tuple[Widened, Widened], bias: Bias, mean
     return Measured(tried.candidate, costs, eye, caustic, shown, RARE * gathered, bias, tried.first)
 
 
-def _sampled(measured: Measured, source: Attempt, mean: F8, scale: float) -> Measured:
+def _sampled(measured: Measured, source: Attempt, square: F8, scale: float) -> Measured:
     """With what light samples do, told by passes with `MORE` times as many and the same photons and camera rays, by the
     terms that they make: the noise of others would hide it. Their variance is taken to fall as chance's does; it falls
     faster (`pmviewer.render.direct.samples`)."""
     usual, many = source.runs[-1], source.direct[0]
-    direct = max(variance(usual.sampled, mean) - variance(many.sampled, mean), 0.0) / (1 - 1 / MORE)
+    direct = max(variance(usual.sampled, square) - variance(many.sampled, square), 0.0) / (1 - 1 / MORE)
     spent = max(many.stages["camera pass"] - usual.stages["camera pass"], 0.0) * scale / (MORE - 1)
     complement = BY_PHOTONS if source.plan.asks_photons else BY_POWER
     costs = replace(measured.costs, sampled=spent)

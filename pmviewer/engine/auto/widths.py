@@ -62,15 +62,15 @@ class Widened:
 NONE = Widened(Blur(), 0.0, 0.0)
 
 
-def told_by(wide: Tried, usual: Tried, narrow: Tried, mean: F8, hidden: float = 0.0) -> Widened:
-    """From passes with radii of WIDER and 1/WIDER times the usual one, and with that. mean: the picture that variance
-    is relative to. Biases are relative to the mean of what the narrow radius shows, which is blurred least: where light
+def told_by(wide: Tried, usual: Tried, narrow: Tried, square: F8, hidden: float = 0.0) -> Widened:
+    """From passes with radii of WIDER and 1/WIDER times the usual one, and with that. square: what variance is
+    relative to. Biases are relative to the mean of what the narrow radius shows, which is blurred least: where light
     leaks into the dark, the others are brighter than the truth, and the more so the wider they are. (Relative to each
     seed's own narrow picture, `above` was up to twice that of 24 seeds together, with four seeds in museum; relative to
     the mean of four 1.0 to 1.2 times.) `hidden`: how much of the difference of the wide and the usual radius is taken
     to be there, at most, where noise may hide it."""
     span = WIDER**2 - 1 / WIDER**2
-    noise = max(variance(narrow.images, mean) - variance(wide.images, mean), 0.0) / span
+    noise = max(variance(narrow.images, square) - variance(wide.images, square), 0.0) / span
     least = np.mean(narrow.images, axis=0)
     above = difference(wide.images, usual.images, least)
     below = difference(usual.images, narrow.images, least)
