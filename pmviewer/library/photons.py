@@ -34,7 +34,7 @@ class Photons:
     positions: NDArray[np.float32]
     """(n, 3), in the scene's units."""
     directions: NDArray[np.float32]
-    """(n, 3) unit vectors wi, from the surface to where the photon came from (to 0.06°)."""
+    """(n, 3) unit vectors wi, from the surface to where the photon came from (to half a degree)."""
     powers: NDArray[np.float32]
     """(n, 3), red, green and blue in W (to a part in 2000). They are shares of the whole light: a density estimate adds
     them up and divides by the area alone."""

@@ -39,11 +39,10 @@ from pmviewer.kernels.memory import (
     stack_i4,
     store_shared_i8,
 )
-from pmviewer.kernels.vector import normalize
+from pmviewer.kernels.vector import dot, normalize, sub
 from pmviewer.maps.photon_words import decode_direction, decode_power, encode_power
-from pmviewer.maps.search.disc import Disc
-from pmviewer.maps.search.grid import PhotonGrid, build_grid, counted_in_block, grid_ranges
-from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH
+from pmviewer.maps.search.grid import PhotonGrid, build_grid, grid_ranges, lanes_between
+from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH, within8
 
 Share = Literal["all", "1/4", "1/8"]
 SHARES: dict[Share, int] = {"all": 1, "1/4": 4, "1/8": 8}
@@ -156,15 +155,16 @@ def nearest_radiance_photon(radiance, p, n, radius, flatness, similarity):
     for k in range(grid_ranges(radiance, p[0], p[1], p[2], radius, ranges)):
         first, end = _i8(stack_get_i4(ranges, 2 * k)), _i8(stack_get_i4(ranges, 2 * k + 1))
         for block in range(first // WIDTH, (end - 1) // WIDTH + 1):
-            mask = counted_in_block(radiance, block, first, end, Disc(p, n, r2, height, _i4(1)), squared)
-            words = radiance.blocks + block * BLOCK_BYTES + 3 * ROW_BYTES
+            at = radiance.blocks + block * BLOCK_BYTES
+            mask = within8(at, at + ROW_BYTES, at + 2 * ROW_BYTES, p[0], p[1], p[2], r2, squared)
+            mask &= lanes_between(first, end, block)
             while mask != 0:
                 lane = count_trailing_zeros(mask)
                 mask &= mask - _i4(1)
                 d2 = stack_get_f4(squared, lane)
                 if d2 < r2:
-                    m = normalize(decode_direction(load_u4(words, lane)))
-                    if m[0] * n[0] + m[1] * n[1] + m[2] * n[2] >= similarity:
+                    q, m = radiance_photon_place(radiance, block * WIDTH + lane)
+                    if abs(dot(n, sub(q, p))) <= height and dot(m, n) >= similarity:
                         r2 = d2
                         best = block * WIDTH + lane
     return best

@@ -77,7 +77,7 @@ def trace_shadows(scenes, seed, glossy, i0, i1, out, counts):
             material = material_of(scene, prim)
             bsdf = bsdf_at(scene, prim, material, u, v, q, ng, ns, wi, glossy, None)
             if keeps(scene, material, bsdf, ng, wi, glossy) != NOTHING:
-                write_photon(row_of(out, 0), counts[0], q, wi, beta, flags, light)
+                write_photon(row_of(out, 0), counts[0], q, wi, face(ng, wi), beta, flags, light)
                 counts[0] += 1
             flags = _u4(SHADOW_FLAGS)
             p = leave(q, face(ng, wi), gap, d[0], d[1], d[2])

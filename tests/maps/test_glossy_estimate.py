@@ -117,7 +117,11 @@ def test_a_tilted_shading_normal_weighs_each_photon_by_its_cosines(cloud):
         offset = known["position"] - points[i]
         front = known["wi"] @ normals[i]
         shading = known["wi"] @ tilted[i]
-        near = (np.linalg.norm(offset, axis=1) < 0.2) & (front > 0) & (shading > 0)
+        near = (
+            (np.linalg.norm(offset, axis=1) < 0.2)
+            & naive.arriving(photons, points[i], normals[i], 0.2 / 256)
+            & (shading > 0)
+        )
         quotient = shading[near] / np.maximum(front[near], np.minimum(GRAZING, shading[near]))
         expected = (known["Phi"][near] * quotient[:, None]).sum(0) * np.array(ALBEDO) / np.pi / (np.pi * 0.2**2)
         np.testing.assert_allclose(L[i], expected, rtol=2e-3, atol=1e-6)

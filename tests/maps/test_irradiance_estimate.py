@@ -246,3 +246,51 @@ def test_the_same_bits_again_whole_or_in_pieces(mixture):
     whole, _, _ = by_knn(tree, points, normals, 30, 1.0)
     pieces = np.vstack([by_knn(tree, points[i : i + 7], normals[i : i + 7], 30, 1.0)[0] for i in range(0, 24, 7)])
     np.testing.assert_array_equal(whole, pieces)
+
+
+@pytest.mark.parametrize("how", ["radius", "knn"])
+def test_the_inside_of_a_housing_is_not_seen_on_its_outside(how):
+    """Photons on both sides of a thin tube, those inside a thousand times as bright, as in a lamp: light from all over
+    the hemisphere of either side. Outside no look-up has any of the inside's, with discs nearly as wide as the tube,
+    and what belongs there is left."""
+    rng = np.random.default_rng(6)
+    n, tube = 200_000, 0.1
+    angle = rng.uniform(0, 2 * np.pi, n)
+    out = np.stack([np.cos(angle), np.sin(angle), np.zeros(n)], axis=1)
+    position = tube * out + [0, 0, 1] * rng.uniform(-1, 1, (n, 1))
+    wi = rng.normal(size=(n, 3))
+    wi /= np.linalg.norm(wi, axis=1, keepdims=True)
+    inside = np.arange(n) % 2 == 0
+    side = np.where(inside, -1, 1) * np.sign(np.einsum("ij,ij->i", wi, out))
+    power, normal = np.where(inside, 1000.0, 1.0)[:, None].repeat(3, axis=1), np.where(inside, -1, 1)[:, None] * out
+    photons = naive.pack(position, wi * side[:, None], power, normal=normal)
+    points, normals = (np.ascontiguousarray(a[1:200:2], f4) for a in (position, out))
+    if how == "radius":
+        radius = 0.08
+        E, counts = by_radius(build_grid(photons, radius), points, normals, radius, 0.2)
+        area = np.pi * radius**2
+    else:
+        E, counts, radii = by_knn(build_kdtree(photons), points, normals, 500, 0.08, 0.2)
+        area = np.pi * radii[:, None] ** 2
+    expected = n / 2 / (2 * np.pi * tube * 2)  # photons to an area
+    print(f"{how}: {E.mean() / expected:.3f} of what is there")
+    assert (E * area < counts[:, None] + 0.5).all()
+    assert (E[np.abs(points[:, 2]) < 0.9] > 0.7 * expected).all()
+
+
+def test_the_inside_of_a_box_does_not_count_on_its_top():
+    """Photons on both sides of a thin wall below a place, near the edge of a box's top: those of its outside count as
+    far down as the disc reaches, those of its inside do not."""
+    rng = np.random.default_rng(7)
+    n, radius = 200_000, 0.056
+    position = np.stack([np.full(n, 0.05), rng.uniform(-1, 1, n), rng.uniform(-0.03, 0.0, n)], axis=1)
+    outside = np.arange(n) % 2 == 0
+    normal = np.where(outside, 1, -1)[:, None] * [1.0, 0, 0]
+    photons = naive.pack(position, (normal + [0, 0, 1]) / np.sqrt(2), 1.0, normal=normal)
+    points = np.stack([np.zeros(50), rng.uniform(-0.8, 0.8, 50), np.zeros(50)], axis=1).astype(f4)
+    up = np.tile(np.array([0, 0, 1], f4), (50, 1))
+    _, counts = by_radius(build_grid(photons, radius), points, up, radius, 0.2)
+    low = outside & (position[:, 2] >= -0.2 * radius)
+    expected = [(low & (np.linalg.norm(position - p, axis=1) < radius)).sum() for p in points]
+    assert min(expected) > 100
+    np.testing.assert_allclose(counts, expected, atol=1)

@@ -10,10 +10,14 @@ from tests.support.device import from_python
 
 encode_direction = from_python(photon_words.encode_direction)
 decode_direction = from_python(photon_words.decode_direction)
+decode_normal = from_python(photon_words.decode_normal)
+encode_arrival = from_python(photon_words.encode_arrival)
+is_apart = from_python(photon_words.is_apart)
 encode_power, decode_power = from_python(photon_words.encode_power), from_python(photon_words.decode_power)
 
 f4 = np.float32
-WORST_ANGLE = 0.06  # degrees
+WORST_ANGLE, WORST_ARRIVAL = 0.06, 0.5  # degrees; of a direction alone and with a normal
+WORST_NORMAL = 30.0
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +37,29 @@ def test_direction_round_trip(directions):
         sine = np.linalg.norm(np.cross(decoded / length, wi.astype(np.float64)))
         assert sine < np.radians(WORST_ANGLE)
         assert decoded @ wi > 0
+
+
+def test_directions_and_normals_round_trip_in_one_word(directions):
+    """And no surface is taken to be apart from what it may be one with."""
+    normals = np.roll(directions, 7, axis=0)
+    for wi, n in zip(directions, normals, strict=True):
+        code = encode_arrival(tuple(wi), tuple(n))
+        assert int(code) & 0xFF == 0
+        w, m = (np.array(decode(code), np.float64) for decode in (decode_direction, decode_normal))
+        assert w @ wi / np.linalg.norm(w) > np.cos(np.radians(WORST_ARRIVAL))
+        assert m @ n / np.linalg.norm(m) > np.cos(np.radians(WORST_NORMAL))
+        middle = record.decode_normals(np.array([code], np.uint32))[0]
+        np.testing.assert_allclose(middle, m / np.linalg.norm(m), atol=1e-6)
+        cell, beside = tuple(m.astype(f4)), np.cross(n, wi)
+        for other in (n + 1e-3 * beside, beside + 1e-3 * n, wi):
+            other = (other / np.linalg.norm(other)).astype(f4)
+            if other @ n >= 0:
+                bent = n - other  # to a place on the convex side of an edge or a bend between both
+                assert not is_apart(cell, tuple(bent), tuple(other))
+                assert not is_apart(cell, tuple(-bent), tuple(other))
+        assert is_apart(cell, tuple(beside), tuple(-n))
+    obvious = naive.encode_arrival(directions, normals)
+    assert np.mean([int(encode_arrival(tuple(w), tuple(n))) for w, n in zip(directions, normals)] == obvious) > 0.99
 
 
 def test_axes_are_exact(directions):
@@ -74,7 +101,7 @@ def test_unpack_names_everything(directions):
     unpacked = record.unpack(naive.pack(position, directions, power, flags, light), 3.0)
     np.testing.assert_array_equal(unpacked["position"], position)
     np.testing.assert_allclose(unpacked["Phi"], 3 * power, rtol=2.0**-11 * 1.001)
-    assert np.linalg.norm(np.cross(unpacked["wi"], directions), axis=1).max() < np.radians(WORST_ANGLE)
+    assert np.linalg.norm(np.cross(unpacked["wi"], directions), axis=1).max() < np.radians(WORST_ARRIVAL)
     np.testing.assert_array_equal(unpacked["bounces"], flags & 0x1F)
     np.testing.assert_array_equal(unpacked["path_class"], flags >> 6)
     np.testing.assert_array_equal(unpacked["light"], light)

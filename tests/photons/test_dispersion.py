@@ -78,7 +78,7 @@ def _write(rows, powers, band):
         p = (np.float32(0.001 * i), np.float32(0.3), np.float32(-1.7))
         wi = (np.float32(0.0), np.float32(1.0), np.float32(0.0))
         power = (powers[i, 0], powers[i, 1], powers[i, 2])
-        write_banded(row_of(rows, 0), i, p, wi, power, np.uint32(2), 7, np.uint32(band))
+        write_banded(row_of(rows, 0), i, p, wi, wi, power, np.uint32(2), 7, np.uint32(band))
 
 
 def test_a_band_costs_no_power():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.opened import open_scene
-from pmviewer.maps.record import BOUNCES, unpack
+from pmviewer.maps.record import BOUNCES, decode_directions, unpack
 from pmviewer.photons.light_pass.light_pass import trace_pass
 from pmviewer.photons.light_pass.paths import MOST_VERTICES, empty_paths
 from pmviewer.settings.access import Settings
@@ -36,18 +36,30 @@ def used(paths):
     return paths.vertices[inside], (number > 0) & inside
 
 
+def plain(row):
+    """A photon's bytes without its direction and normal."""
+    words = row.view(np.uint32).copy()
+    words[3] &= 0xFF
+    return words.tobytes()
+
+
 @pytest.mark.parametrize("first", [0, 2 * N])
 def test_stored_photons_lie_on_the_paths_with_their_power(box, first):
-    """The global photons of the first M trajectories are vertices of the paths, word for word, in the same order."""
+    """The global photons of the first M trajectories are vertices of the paths, word for word but for the normal that
+    the direction's word tells, in the same order."""
     paths = empty_paths(M, box.radius)
     few = trace(box, first, watch=paths)
     everything = trace(box, first)
     stored = everything.global_[: len(few.global_)]
     np.testing.assert_array_equal(few.global_.view(np.uint32), stored.view(np.uint32))
     assert len(stored) > M
-    words = {row.tobytes() for row in used(paths)[0]}
-    assert all(row.tobytes() in words for row in stored)
-    mirrors = sum(row.tobytes() not in {s.tobytes() for s in stored} for row in paths.vertices[:, 1][paths.counts > 1])
+    vertices = {plain(row): row for row in used(paths)[0]}
+    kept = {plain(row) for row in stored}
+    assert kept <= set(vertices)
+    ways = decode_directions(stored.view(np.uint32)[:, 3])
+    drawn = decode_directions(np.array([vertices[plain(row)].view(np.uint32)[3] for row in stored]))
+    np.testing.assert_allclose(ways, drawn, atol=0.016)
+    mirrors = sum(plain(row) not in kept for row in paths.vertices[:, 1][paths.counts > 1])
     assert mirrors > 0, "mirror and glass, where nothing is stored, are on the paths too"
 
 
@@ -62,7 +74,7 @@ def test_paths_start_on_the_light_and_count_bounces(box):
         np.testing.assert_array_equal(seen["bounces"][1:], np.arange(count - 1) & BOUNCES)
         way = np.diff(path[:count, :3], axis=0)
         way /= np.linalg.norm(way, axis=1, keepdims=True)
-        np.testing.assert_allclose(-way, seen["wi"][1:], atol=3e-3)
+        np.testing.assert_allclose(-way, seen["wi"][1:], atol=8e-3)
 
 
 def test_a_photon_that_leaves_ends_a_little_way_out():

@@ -31,16 +31,35 @@ def neighbours(positions: np.ndarray, point: np.ndarray, k: int, max_radius: flo
     return order[d[order] < max_radius]
 
 
-def _candidates(photons, power_unit, point, normal, class_mask):
+def arriving(photons, point, normal, flat=0.0):
+    """Which photons (n,) come from the front to what may be the same surface: the cells of their normals have middles
+    that are less than 120° away, and those below the plane don't have the place before them by more than 30°. Up to
+    `flat` off the plane all may."""
+    words = photons.view(np.uint32)[:, 3]
+    u, v = (((words >> shift) & 7).astype(float) / 4 - 0.875 for shift in (20, 8))
+    middles = np.stack([u, v, 1 - np.abs(u) - np.abs(v)], axis=1)
+    below = middles[:, 2] < 0
+    folded = (1 - np.abs(middles[:, 1::-1])) * np.where(middles[:, :2] >= 0, 1, -1)
+    middles[below, :2] = folded[below]
+    middles /= np.linalg.norm(middles, axis=1, keepdims=True)
+    normal = np.asarray(normal, float)
+    d = photons[:, :3].astype(float) - point
+    sine = np.einsum("ij,ij->i", middles, d) / np.maximum(np.linalg.norm(d, axis=1), 1e-300)
+    apart = (d @ normal < 0) & (sine < -0.5)
+    front, off = unpack(photons, 1.0)["wi"].astype(float) @ normal > 0, np.abs(d @ normal) > flat
+    return front & ~(off & ((middles @ normal < -0.5) | apart))
+
+
+def _candidates(photons, power_unit, point, normal, class_mask, flat=0.0):
     """Offsets from the point and powers of photons that arrive from the front on a wanted path."""
     p = unpack(photons, power_unit)
-    keep = (p["wi"].astype(float) @ normal > 0) & ((class_mask >> p["path_class"]) & 1).astype(bool)
+    keep = arriving(photons, point, normal, flat) & ((class_mask >> p["path_class"]) & 1).astype(bool)
     return p["position"][keep].astype(float) - point, p["Phi"][keep].astype(float)
 
 
 def irradiance_radius(photons, power_unit, point, normal, radius, flatness, class_mask, kind, cone_k):
     """(E (3,), count)."""
-    offset, power = _candidates(photons, power_unit, point, normal, class_mask)
+    offset, power = _candidates(photons, power_unit, point, normal, class_mask, flatness * radius / 256)
     d = np.linalg.norm(offset, axis=1)
     keep = (d < radius) & (np.abs(offset @ normal) <= flatness * radius)
     w = WEIGHTS[kind](d[keep] / radius, cone_k)
@@ -69,24 +88,41 @@ def encode_power(x: np.ndarray) -> np.ndarray:
     return np.clip(np.where(codes < 1, 0, codes), 0, 0xFFFF).astype(np.uint32)
 
 
+def _octahedral(w: np.ndarray) -> np.ndarray:
+    w = np.asarray(w, np.float64)
+    uv = w[:, :2] / np.abs(w).sum(axis=1, keepdims=True)
+    folded = (1 - np.abs(uv[:, ::-1])) * np.where(uv >= 0, 1, -1)
+    return np.where(w[:, 2:] < 0, folded, uv)
+
+
+def encode_arrival(wi: np.ndarray, n: np.ndarray) -> np.ndarray:
+    """24-bit codes of unit vectors (n, 3) with the cells of unit normals (n, 3) in the lowest bits: of all codes with
+    these bits the nearest."""
+    coordinates = []
+    for place, cell in zip(_octahedral(wi).T, _octahedral(n).T, strict=True):
+        low = np.minimum(np.floor((cell + 1) * 4), 7)
+        most = np.where(low < 7, 511, 510)  # 4094 is the last code
+        step = np.clip(np.floor((place * 2047 + 2047 - low) / 8 + 0.5), 0, most)
+        coordinates.append((8 * step + low).astype(np.uint32))
+    return coordinates[0] << 20 | coordinates[1] << 8
+
+
 def encode_direction(wi: np.ndarray) -> np.ndarray:
     """24-bit octahedral codes, in the high bits of uint32, of unit vectors (n, 3)."""
-    wi = np.asarray(wi, np.float64)
-    uv = wi[:, :2] / np.abs(wi).sum(axis=1, keepdims=True)
-    folded = (1 - np.abs(uv[:, ::-1])) * np.where(uv >= 0, 1, -1)
-    uv = np.where(wi[:, 2:] < 0, folded, uv)
+    uv = _octahedral(wi)
     grid = np.clip(np.floor(uv * 2047 + 2047.5), 0, 4094).astype(np.uint32)
     return grid[:, 0] << 20 | grid[:, 1] << 8
 
 
-def pack(position, wi=(0.0, 0.0, 1.0), power=1.0, flags=0, light=0) -> np.ndarray:
-    """Photons (n, 6) float32; what is given once holds for all."""
+def pack(position, wi=(0.0, 0.0, 1.0), power=1.0, flags=0, light=0, normal=None) -> np.ndarray:
+    """Photons (n, 6) float32; what is given once holds for all. Without normals wi are theirs."""
     n = len(position)
     photons = np.empty((n, 6), np.float32)
     photons[:, :3] = position
     words = photons.view(np.uint32)
     codes = encode_power(np.broadcast_to(power, (n, 3)))
-    words[:, 3] = encode_direction(np.broadcast_to(wi, (n, 3))) | np.broadcast_to(np.asarray(flags, np.uint32), n)
+    arrivals = (np.broadcast_to(w, (n, 3)) for w in (wi, wi if normal is None else normal))
+    words[:, 3] = encode_arrival(*arrivals) | np.broadcast_to(np.asarray(flags, np.uint32), n)
     words[:, 4] = codes[:, 0] | codes[:, 1] << 16
     words[:, 5] = codes[:, 2] | np.broadcast_to(np.asarray(light, np.uint32), n) << 16
     return photons

@@ -61,12 +61,14 @@ def morton_order(points: np.ndarray) -> np.ndarray:
 
 
 def _photons(n: int, seed: int) -> np.ndarray:
-    """Photons (n, 6) float32: clustered positions, directions from everywhere, powers about one."""
+    """Photons (n, 6) float32: clustered positions, directions from everywhere to surfaces that face up, as look-ups do,
+    powers about one."""
     photons = np.empty((n, 6), _f4)
     photons[:, :3] = clustered(n, seed)
     rng = np.random.default_rng(seed)
     words = photons.view(np.uint32)
-    words[:, 3] = rng.integers(0, 4095, n) << 20 | rng.integers(0, 4095, n) << 8
+    up = 4 << 20 | 7 << 8  # `pmviewer.maps.record`
+    words[:, 3] = rng.integers(0, 511, n) << 23 | rng.integers(0, 511, n) << 11 | up
     words[:, 4] = 0xBC00BC00
     words[:, 5] = 0xBC00
     return photons

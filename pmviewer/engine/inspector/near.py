@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.maps.record import decode_directions
+from pmviewer.maps.photon_words import SURELY
+from pmviewer.maps.record import decode_directions, decode_normals
 from pmviewer.maps.search.parts import Combination
 
 CHUNK = 1 << 20
@@ -88,7 +90,9 @@ def _part(photons: NDArray[np.float32], first: int, disc: Disc, radius: np.float
     counts &= (word & disc.flags) == disc.flags
     counts &= (d2 < radius * radius) & (reach <= radius * radius)
     if not disc.both_sides:
-        counts &= front
+        m, least = decode_normals(word), math.sqrt(SURELY)
+        apart = (height < 0) & ((m * offset).sum(axis=1) < -least * np.sqrt(d2))
+        counts &= front & (m @ disc.n >= -least) & ~apart
     return Near((first + here[counts]).astype(np.int64), d2[counts], reach[counts], front[counts])
 
 

@@ -30,7 +30,6 @@ from pmviewer.kernels.memory import (
 from pmviewer.maps.density.neighbours8 import MEMBER, NEED, ROWS, WORD, X, Y, Z, neighbours8
 from pmviewer.maps.search.k_nearest import keep_nearest
 from pmviewer.maps.search.simd import BLOCK_BYTES, WIDTH, facing8
-from pmviewer.maps.search.stored import ALL_CLASSES
 
 M = 20
 """Neighbours that measure the density and share the power of a rejected photon."""
@@ -180,7 +179,7 @@ def _of_leaf(leaf, p, n, ceiling, limits, r2, scratch, count):
         block = leaf + (first // WIDTH) * BLOCK_BYTES
         mask = neighbours8(block, p, n, limits.steepness, r2, ceiling, scratch.squared)
         if mask != 0 and limits.one_side:
-            mask &= facing8(block, p, n, _f4(np.inf), _i4(ALL_CLASSES))
+            mask &= facing8(block, n)
         count = add_keys(block, mask, scratch, count)
     return count
 

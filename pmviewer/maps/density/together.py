@@ -35,7 +35,6 @@ from pmviewer.maps.density.growing_tree import (
 from pmviewer.maps.density.neighbours8 import MEMBER, NEED, ROWS, below8, distances8, inside8
 from pmviewer.maps.search.k_nearest import keep_nearest
 from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH, count_bits, facing8
-from pmviewer.maps.search.stored import ALL_CLASSES
 
 MOST_LEAVES, MOST_CANDIDATES = 128, 1024
 """Of a group; where there are more, places search for themselves."""
@@ -116,7 +115,7 @@ def collected(tree, leaves, leaf_count, box, n, ceiling, limits, candidates):
             block = address + (first // WIDTH) * BLOCK_BYTES
             mask = inside8(block, low, high)
             if mask != 0 and limits.one_side:
-                mask &= facing8(block, low, n, _f4(np.inf), _i4(ALL_CLASSES))
+                mask &= facing8(block, n)
             if count + WIDTH > MOST_CANDIDATES:
                 return _i8(-1)
             while mask != 0:

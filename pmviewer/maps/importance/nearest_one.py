@@ -34,7 +34,7 @@ def squared_distance(tree, i, p, n, steepness):
     in space."""
     dx, dy, dz = load_f4(tree.x, i) - p[0], load_f4(tree.y, i) - p[1], load_f4(tree.z, i) - p[2]
     e2 = dx * dx + dy * dy + dz * dz
-    if not arrives(tree, i, n, _i4(ALL_CLASSES)):
+    if not arrives(tree, i, p, n, _i4(ALL_CLASSES)):
         return _f4(np.inf), e2
     h = height_above(tree, i, p, n)
     return max(e2, steepness * h * h), e2
@@ -53,7 +53,7 @@ def nearest_in_block(tree, j, end, p, n, steepness, best, r2, e2, squared):
         mask &= mask - _i4(1)
         d2, e = stack_get_f4(squared, lane), stack_get_f4(squared, WIDTH + lane)
         if d2 < r2 or (d2 == r2 and e < e2):
-            if arrives(tree, j + lane, n, _i4(ALL_CLASSES)):
+            if arrives(tree, j + lane, p, n, _i4(ALL_CLASSES)):
                 r2, e2, best = d2, e, j + lane
     return best, r2, e2
 

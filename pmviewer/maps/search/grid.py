@@ -33,7 +33,7 @@ from pmviewer.maps.search.cell_sort import (
     sort_by_bucket,
     sort_by_cell,
 )
-from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH, count_bits, facing8, within8
+from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH, apart8, count_bits, in_disc8, within8
 from pmviewer.tasks import Steps, in_steps, in_turn
 
 DENSE_CELLS_PER_PHOTON = 1.5
@@ -209,7 +209,10 @@ def counted_in_block(grid, block, first, end, disc, squared):
         & lanes_between(first, end, block)
     )
     if mask != 0:
-        mask &= facing8(at, p, disc.n, disc.height, disc.class_mask)
+        found = in_disc8(at, p, disc.n, disc.height, disc.class_mask)
+        if mask & (found >> _i4(WIDTH)) != 0:  # hardly ever on walls and floors
+            found &= ~apart8(at, p, disc.n)
+        mask &= found
     return mask
 
 

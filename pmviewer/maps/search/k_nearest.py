@@ -111,7 +111,7 @@ def _distance(tree, i, d2, r2, p, facing):
     def of_disc(tree, i, d2, r2, p, facing):
         h = height_above(tree, i, p, facing.n)
         d2 = max(d2, facing.steepness * h * h)
-        if d2 < r2 and arrives(tree, i, facing.n, facing.class_mask):
+        if d2 < r2 and arrives(tree, i, p, facing.n, facing.class_mask):
             return d2
         return _f4(np.inf)
 

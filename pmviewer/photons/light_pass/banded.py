@@ -8,11 +8,13 @@ from pmviewer.maps.photon_words import write_banded, write_photon
 
 
 @specialised
-def write_of_wave(rows, row, p, wi, power, flags, light, wave):
+def write_of_wave(rows, row, p, wi, n, power, flags, light, wave):
     """`write_photon` of a photon with that wave (`pmviewer.kernels.bsdf.dispersion`), None in scenes without
     dispersion."""
     if absent(wave):
-        return lambda rows, row, p, wi, power, flags, light, wave: write_photon(rows, row, p, wi, power, flags, light)
-    return lambda rows, row, p, wi, power, flags, light, wave: write_banded(
-        rows, row, p, wi, power, flags, light, band_of(wave)
+        return lambda rows, row, p, wi, n, power, flags, light, wave: write_photon(
+            rows, row, p, wi, n, power, flags, light
+        )
+    return lambda rows, row, p, wi, n, power, flags, light, wave: write_banded(
+        rows, row, p, wi, n, power, flags, light, band_of(wave)
     )

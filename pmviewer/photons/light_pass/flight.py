@@ -162,7 +162,7 @@ def _store(pass_, of, volume_out, counts, collision, bounces):
     for _ in range(times):
         row = counts[C_VOLUME]
         wi, power = (-d[0], -d[1], -d[2]), scale(scattered, of.factor)
-        write_of_wave(row_of(volume_out, 0), row, p, wi, power, word, of.light, wave)
+        write_of_wave(row_of(volume_out, 0), row, p, wi, None, power, word, of.light, wave)
         counts[C_VOLUME] += 1
 
 

@@ -61,7 +61,7 @@ def _put(paths, i, p, wi, beta, flags, light, wave):
     row = counts[i]
     if row >= MOST_VERTICES:
         return
-    write_of_wave(row_of(vertices[i], 0), row, p, wi, beta, flags, light, wave)
+    write_of_wave(row_of(vertices[i], 0), row, p, wi, None, beta, flags, light, wave)
     counts[i] = row + 1
 
 

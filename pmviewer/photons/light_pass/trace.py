@@ -398,7 +398,8 @@ def _store(into, counts, which, arrival, power, times):
     rows, normals, with_normals, _ = into
     ng = arrival.ng
     for _ in range(times):
-        write_of_wave(rows, counts[which], arrival.p, arrival.wi, power, arrival.flags, arrival.light, arrival.wave)
+        row, flags = counts[which], arrival.flags
+        write_of_wave(rows, row, arrival.p, arrival.wi, ng, power, flags, arrival.light, arrival.wave)
         if with_normals:
             normals[counts[which]] = encode_direction(ng[0], ng[1], ng[2])
         counts[which] += 1
