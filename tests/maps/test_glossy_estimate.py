@@ -119,7 +119,7 @@ def test_a_tilted_shading_normal_weighs_each_photon_by_its_cosines(cloud):
         shading = known["wi"] @ tilted[i]
         near = (
             (np.linalg.norm(offset, axis=1) < 0.2)
-            & naive.arriving(photons, points[i], normals[i], 0.2 / 256)
+            & naive.arriving(photons, points[i], normals[i], 0.2 / 2048)
             & (shading > 0)
         )
         quotient = shading[near] / np.maximum(front[near], np.minimum(GRAZING, shading[near]))

@@ -59,7 +59,7 @@ def _candidates(photons, power_unit, point, normal, class_mask, flat=0.0):
 
 def irradiance_radius(photons, power_unit, point, normal, radius, flatness, class_mask, kind, cone_k):
     """(E (3,), count)."""
-    offset, power = _candidates(photons, power_unit, point, normal, class_mask, flatness * radius / 256)
+    offset, power = _candidates(photons, power_unit, point, normal, class_mask, flatness * radius / 2048)
     d = np.linalg.norm(offset, axis=1)
     keep = (d < radius) & (np.abs(offset @ normal) <= flatness * radius)
     w = WEIGHTS[kind](d[keep] / radius, cone_k)

@@ -210,9 +210,10 @@ def counted_in_block(grid, block, first, end, disc, squared):
     )
     if mask != 0:
         found = in_disc8(at, p, disc.n, disc.height, disc.class_mask)
-        if mask & (found >> _i4(WIDTH)) != 0:  # hardly ever on walls and floors
-            found &= ~apart8(at, p, disc.n)
+        off = mask & (found >> _i4(WIDTH))
         mask &= found
+        if off != 0:  # hardly ever on walls and floors
+            mask &= ~(off & apart8(at, p, disc.n))
     return mask
 
 

@@ -19,7 +19,7 @@ WIDTH = 8
 ROW_BYTES = 4 * WIDTH
 BLOCK_BYTES = 6 * ROW_BYTES
 """A grid keeps eight photons in a block: the six words of their records in turn, eight to a row."""
-FLAT = 1 / 256
+FLAT = 1 / 2048
 """Of a disc's half-thickness: photons nearer to the plane are on a flat surface, whose sides `wi` tells apart."""
 VECTOR = ir.VectorType(F32, WIDTH)
 _WORDS = ir.VectorType(I32, WIDTH)
