@@ -5,12 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import open_scene
+from pmviewer.render.direct.direct import power_heuristic
 from pmviewer.render.direct.samples import SAMPLES, SEVERAL, samples_at_surface
 from pmviewer.scene.description import Camera, Parallelogram, Scene, Shape
+from tests.support.device import from_python
 from tests.support.scenes import diffuse, panel, rendered, settings_of
+
+f4 = np.float32
 
 
 def direct_light(samples, passes):
@@ -51,3 +56,16 @@ def test_several_lights_and_skies_get_more():
     one = open_scene("cornell_diffuse").traits
     assert number(one) == SAMPLES
     assert number(replace(one, has_environment=True)) == number(open_scene("cornell_lights").traits) == SEVERAL
+
+
+@pytest.mark.parametrize("scale", [1e-30, 1.0, 1e15, 1e30])
+def test_samples_of_two_techniques_weigh_one_together_at_any_density(scale):
+    """Of densities whose squares float32 does not hold, too; of an infinite one, as a light has that is seen from its
+    edge, all: weights that are no numbers would cost the sample."""
+    weight = from_python(power_heuristic)
+    for a, b in ((1.0, 1.0), (3.0, 1.0), (1.0, 2.5), (1.0, 0.0)):
+        first, second = (weight(f4(2), f4(x * scale), f4(2), f4(y * scale)) for x, y in ((a, b), (b, a)))
+        assert first == pytest.approx(a * a / (a * a + b * b), rel=1e-6)
+        assert first + second == pytest.approx(1.0, rel=1e-6)
+    assert weight(f4(1), f4(np.inf), f4(1), f4(scale)) == 1.0
+    assert weight(f4(1), f4(scale), f4(1), f4(np.inf)) == 0.0

@@ -30,9 +30,16 @@ _i8 = np.int64
 
 @device
 def power_heuristic(n_this, pdf_this, n_other, pdf_other):
-    """Weight of a sample of one technique among two, β = 2 (Veach 1997)."""
+    """Weight of a sample of one technique among two, β = 2 (Veach 1997), for densities up to infinity, which lights have
+    that are seen from their edge."""
     a, b = n_this * pdf_this, n_other * pdf_other
-    return a * a / (a * a + b * b)
+    if a == b:
+        return _f4(0.5)
+    if a > b:
+        t = b / a
+        return _f4(1.0) / (_f4(1.0) + t * t)
+    t = a / b
+    return t * t / (_f4(1.0) + t * t)
 
 
 @device
