@@ -30,8 +30,8 @@ _i8 = np.int64
 
 @device
 def power_heuristic(n_this, pdf_this, n_other, pdf_other):
-    """Weight of a sample of one technique among two, β = 2 (Veach 1997), for densities up to infinity, as of lights that
-    are seen from their edge."""
+    """Weight of a sample of one technique among two, β = 2 (Veach 1997), for densities up to infinity: lights have them
+    that are seen from their edge."""
     a, b = n_this * pdf_this, n_other * pdf_other
     if a == b:
         return _f4(0.5)
