@@ -28,8 +28,9 @@ from pmviewer.kernels.memory import (
     store_i4,
 )
 from pmviewer.maps.density.neighbours8 import MEMBER, NEED, ROWS, WORD, X, Y, Z, neighbours8
+from pmviewer.maps.search.in_disc import facing8
 from pmviewer.maps.search.k_nearest import keep_nearest
-from pmviewer.maps.search.simd import BLOCK_BYTES, WIDTH, facing8
+from pmviewer.maps.search.simd import BLOCK_BYTES, WIDTH
 
 M = 20
 """Neighbours that measure the density and share the power of a rejected photon."""

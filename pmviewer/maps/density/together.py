@@ -33,8 +33,9 @@ from pmviewer.maps.density.growing_tree import (
     M,
 )
 from pmviewer.maps.density.neighbours8 import MEMBER, NEED, ROWS, below8, distances8, inside8
+from pmviewer.maps.search.in_disc import facing8
 from pmviewer.maps.search.k_nearest import keep_nearest
-from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH, count_bits, facing8
+from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH, count_bits
 
 MOST_LEAVES, MOST_CANDIDATES = 128, 1024
 """Of a group; where there are more, places search for themselves."""

@@ -33,7 +33,8 @@ from pmviewer.maps.search.cell_sort import (
     sort_by_bucket,
     sort_by_cell,
 )
-from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH, apart8, count_bits, in_disc8, within8
+from pmviewer.maps.search.in_disc import apart8, in_disc8
+from pmviewer.maps.search.simd import BLOCK_BYTES, ROW_BYTES, WIDTH, count_bits, within8
 from pmviewer.tasks import Steps, in_steps, in_turn
 
 DENSE_CELLS_PER_PHOTON = 1.5
