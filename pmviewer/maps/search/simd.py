@@ -26,6 +26,7 @@ FAST = ("contract", "reassoc", "nsz")
 
 
 def constant(vector, value):
+    """Eight times the same number, known when compiling."""
     return ir.Constant(vector, [value] * WIDTH)
 
 
