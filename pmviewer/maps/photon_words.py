@@ -9,11 +9,7 @@ from pmviewer.kernels.compile.specialise import absent, specialised
 from pmviewer.kernels.dimensions import BAND_SALT
 from pmviewer.kernels.memory import bits_of_float, float_of_bits
 from pmviewer.kernels.random import hash3
-from pmviewer.kernels.vector import dot
 from pmviewer.maps.record import EXPONENT_BASE
-
-SURELY = 0.25
-"""Square of the sine of 30°: with more of a cosine, squared, a cell of normals is on one side of a plane whole."""
 
 _EXPONENT_BASE = np.uint32(EXPONENT_BASE)
 _f4 = np.float32
@@ -144,20 +140,6 @@ def write_banded(rows, row, p, wi, n, power, flags, light, band):
     b = encode_marked(power[2], _u4(_u4(band) >> _u4(4)) & _u4(3), _u4(more & _u4(0x7FFF)))
     rows[at + 4] = float_of_bits(_u4(r | _u4(g << _u4(16))))
     rows[at + 5] = float_of_bits(_u4(b | _u4(_u4(light) << _u4(16))))
-
-
-@device
-def is_apart(m, d, n):
-    """Whether a surface that is d away from a place with unit normal n is surely not the same side of the same one,
-    wherever in the cell with the middle m its normal is.
-
-    Its normal points away from n, as on the inside of a bent sheet. Or it lies below the plane of the place and has the
-    place before it, as the inside of a box has: what is convex has it behind. (The other way round, behind a wall,
-    what counts wrongly makes up for what the disc lacks at the foot of that: without it more is wrong than with it.)
-    """
-    least = _f4(SURELY) * dot(m, m)
-    cosine, along = min(dot(m, n), _f4(0.0)), min(dot(m, d), _f4(0.0))
-    return cosine * cosine > least or (dot(d, n) < _f4(0.0) and along * along > least * dot(d, d))
 
 
 @inlined

@@ -19,7 +19,7 @@ lights, so that the range 2⁻⁴⁷ … 2¹⁷ fits any scene's scale.
 
 The normal is that of the side that the photon came to, octahedral, too, by one of 8 × 8 cells: no normal is farther
 from its cell's middle than 30°. `wi` has the nearest code with these bits, 0.2° off and half a degree at worst.
-Look-ups leave out photons of what is surely another side or surface (`pmviewer.maps.photon_words.is_apart`). Photons
+Look-ups leave out photons of what is surely another side or surface (`pmviewer.maps.search.sides.is_apart`). Photons
 of media have no normal, and all bits for `wi`, 0.06° off at worst.
 
 Flags: bit 7 the last scattering was specular; bit 6 there was a non-specular scattering before. They spell the path

@@ -5,6 +5,7 @@ import pytest
 
 from pmviewer.maps import photon_words, record
 from pmviewer.maps.first import first_in_classes
+from pmviewer.maps.search import sides
 from tests.support import naive_maps as naive
 from tests.support.device import from_python
 
@@ -12,7 +13,7 @@ encode_direction = from_python(photon_words.encode_direction)
 decode_direction = from_python(photon_words.decode_direction)
 decode_normal = from_python(photon_words.decode_normal)
 encode_arrival = from_python(photon_words.encode_arrival)
-is_apart = from_python(photon_words.is_apart)
+is_apart = from_python(sides.is_apart)
 encode_power, decode_power = from_python(photon_words.encode_power), from_python(photon_words.decode_power)
 
 f4 = np.float32

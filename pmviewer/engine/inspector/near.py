@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.maps.photon_words import SURELY
 from pmviewer.maps.record import decode_directions, decode_normals
 from pmviewer.maps.search.parts import Combination
+from pmviewer.maps.search.sides import SURELY
 
 CHUNK = 1 << 20
 """Photons looked at in one go."""

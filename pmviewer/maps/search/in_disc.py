@@ -8,7 +8,8 @@ from numba import types
 from numba.core import cgutils
 
 from pmviewer.kernels.memory import I8, I32, I64, at_address, with_twin
-from pmviewer.maps.photon_words import SURELY, decode_direction, decode_normal, is_apart
+from pmviewer.maps.photon_words import decode_direction, decode_normal
+from pmviewer.maps.search.sides import SURELY, is_apart
 from pmviewer.maps.search.simd import (
     BITS,
     FAST,
@@ -123,7 +124,7 @@ def _apart8(block, p, n):
 
 @with_twin(_apart8)
 def apart8(typingctx, block, p, n):
-    """Which photons of a grid's block `pmviewer.maps.photon_words.is_apart` finds apart from a place.
+    """Which photons of a grid's block `pmviewer.maps.search.sides.is_apart` finds apart from a place.
 
     block: int64 address of the block; p, n: float32 triples, point and normal. Returns int32 with bit j set for
     photon j.

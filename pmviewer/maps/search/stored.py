@@ -8,7 +8,8 @@ from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.memory import load_f4, load_u4
 from pmviewer.kernels.vector import dot, sub
-from pmviewer.maps.photon_words import decode_direction, decode_normal, decode_powers, is_apart
+from pmviewer.maps.photon_words import decode_direction, decode_normal, decode_powers
+from pmviewer.maps.search.sides import is_apart
 
 ALL_CLASSES = 0b1111
 """Class mask that takes photons of every path class."""
@@ -21,7 +22,7 @@ _u4 = np.uint32
 @specialised
 def arrives(photons, i, p, n, class_mask):
     """Whether photon i counts at a place p: it comes from the side that the normal points to, on a path whose class has
-    its bit set, and to a surface that may be the same (`pmviewer.maps.photon_words.is_apart`): what grazes the inside
+    its bit set, and to a surface that may be the same (`pmviewer.maps.search.sides.is_apart`): what grazes the inside
     of a lamp's housing would else light its outside.
 
     Importons (`pmviewer.maps.importance`) have their surface's normal for a direction: it has to be similar.
