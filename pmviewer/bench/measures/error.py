@@ -69,6 +69,13 @@ HELD_WITH = ("cornell_diffuse", "cornell_caustic", "ring_caustic", "rooms_10x10"
 FALL = "; how noise is taken to fall was chosen with this scene among others"
 FALL_WITH = ("cornell_caustic", "rooms_10x10")
 """Scenes by which the powers of `pmviewer.engine.auto.model` and `measured` were chosen, likewise."""
+PREFERRED = (
+    "; that fewer photons need not promise less than others, and how few light samples are preferred, was chosen with "
+    "this scene among others"
+)
+PREFERRED_WITH = ("cornell_diffuse", "cornell_caustic", "rooms_10x10")
+"""Scenes by which EVEN of `pmviewer.engine.auto.model` was chosen, and where FEWER_PHOTONS of
+`pmviewer.engine.auto.choose` does not count, likewise."""
 AUTOMATIC_BUDGET = 8.0
 """Of the curves by what automatic mode chooses, over their target's seconds."""
 
@@ -221,6 +228,7 @@ def run(quick: bool = False) -> BenchResult:
             apart += CHOSEN if scene in CHOSEN_WITH else ""
             apart += ROULETTE if scene in ROULETTE_WITH else ""
             apart += FALL if scene in FALL_WITH else ""
+            apart += PREFERRED if scene in PREFERRED_WITH else ""
         note = f"{scene} to relMSE {error:g}, best: {best.method}{apart}"
         note += HELD if scene in HELD_WITH else ""
         targets.append(Target(target, best.time_to(error), bound, "CPU s", False, note))

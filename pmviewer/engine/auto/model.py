@@ -1,7 +1,8 @@
 """What the trial's figures promise for a given time: error over N, radii, q and passes.
 
 The variance of the mean of n passes is that of the camera rays, whose numbers complement one another from pass to pass,
-eye/n^1.1, or faster where it is light samples' (`Measured.complement`), plus the photons' part, which falls as 1/n.
+eye/n^1.1, or faster where it is light samples', which follow one another within a pass as over passes (`complement` of
+`Measured`), plus the photons' part, which falls as 1/n.
 The photons' variance in pass i goes with r²₁/r²ᵢ, as for Knaus & Zwicker 2011, and bias with a power of rᵢ/r₁ that the
 trial has measured. For a given time radii are delayed (`estimate.delay`) by STEADY times the passes that it has room
 for. Of N trajectories q·N fill both maps and the others the caustic map alone, in the share of the light that
@@ -39,7 +40,7 @@ SAMPLES = (1, 2, 4, 8)
 """Light samples that are tried, relative to the automatic number."""
 BETTER = 0.87
 """What another way must promise of the default's error to be taken: less is within the trial's own noise."""
-EVEN = 1.05
+EVEN = 1.1
 """What of the least error makes no difference."""
 MISSED = 4.0
 """What an error that is never reached costs, in the time to it."""
@@ -77,7 +78,7 @@ def error_after(m: Measured, numbers: Numbers, passes: Any, steady: bool = False
     mean = steady_mean if steady else partial(mean_over, n)
     looked_up = m.caustic / (widths.caustic**2 * numbers.aimed(m.covered)) + m.shown / (widths.shown**2 * numbers.q)
     photons = (looked_up * mean(-2.0) if looked_up else 0.0) + m.gathered / numbers.q
-    eye = (m.eye - m.direct) / n**COMPLEMENT + m.direct / numbers.samples / n**m.complement
+    eye = (m.eye - m.direct) / n**COMPLEMENT + m.direct / (numbers.samples * n) ** m.complement
     return eye + photons / numbers.N / n + bias_of(m, widths).over(n, mean)
 
 

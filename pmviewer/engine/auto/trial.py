@@ -174,12 +174,11 @@ def _measured(tried: Attempt, widened: tuple[Widened, Widened], bias: Bias, squa
 
 def _sampled(measured: Measured, source: Attempt, square: F8, scale: float) -> Measured:
     """With what light samples do, told by passes with `MORE` times as many and the same photons and camera rays, by the
-    terms that they make: the noise of others would hide it. Their variance is taken to fall as chance's does; it falls
-    faster (`pmviewer.render.direct.samples`)."""
+    terms that they make: the noise of others would hide it. Samples of a pass complement one another as passes do."""
     usual, many = source.runs[-1], source.direct[0]
-    direct = max(variance(usual.sampled, square) - variance(many.sampled, square), 0.0) / (1 - 1 / MORE)
-    spent = max(many.stages["camera pass"] - usual.stages["camera pass"], 0.0) * scale / (MORE - 1)
     complement = BY_PHOTONS if source.plan.asks_photons else BY_POWER
+    direct = max(variance(usual.sampled, square) - variance(many.sampled, square), 0.0) / (1 - MORE**-complement)
+    spent = max(many.stages["camera pass"] - usual.stages["camera pass"], 0.0) * scale / (MORE - 1)
     costs = replace(measured.costs, sampled=spent)
     return replace(measured, direct=min(direct, MOST_DIRECT * measured.eye), complement=complement, costs=costs)
 
