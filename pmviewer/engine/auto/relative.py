@@ -31,7 +31,18 @@ def shown_squared(images: list[F8]) -> F8:
 def variance(images: list[F8], square: F8) -> float:
     """Variance of a pass, from those of several seeds, over such a square, without the noisiest pixels. Images
     (h, w, 3)."""
-    plane = np.var(images, axis=0, ddof=1) / (square + EPSILON)
+    return _of_most(np.var(images, axis=0, ddof=1) / (square + EPSILON))
+
+
+def nested(few: list[F8], many: list[F8], square: F8) -> float:
+    """What the variance of such pictures falls by where fewer random numbers are continued to more, seed by seed. If
+    these leave the less they are the more they become, the mean of all is as near to any part's as two means that
+    differ by just that variance: all other noise is the same in both and in none of the differences."""
+    return _of_most(np.mean([(a - b) ** 2 for a, b in zip(few, many, strict=True)], axis=0) / (square + EPSILON))
+
+
+def _of_most(plane: F8) -> float:
+    """The mean over pixels (h, w, 3) without the noisiest."""
     each = np.sort(plane.mean(axis=-1), axis=None)
     return float(each[: each.size - round(each.size * OUTLIERS)].mean())
 

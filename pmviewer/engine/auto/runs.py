@@ -37,8 +37,6 @@ SAMPLED = ("direct", "specular")
 """Terms of the picture that light samples are seen in."""
 LOOKED_UP = ("specular", "caustic", "indirect", "volume", "volume indirect")
 """Terms that photons are seen in. The noise of direct light would hide them."""
-GATHERED = ("indirect",)
-"""The term that gather rays make."""
 STORE = 1 << 28
 JUDGED = 3
 """Pictures after which it is known whether a trial takes too long."""
@@ -55,13 +53,12 @@ class TooDearError(Exception):
 @dataclass
 class Run:
     """Pictures of the seeds with such settings, of them what light samples make, directly or over what is followed,
-    what photons do, and what gather rays do; and the CPU seconds by stage of the quickest one."""
+    and what photons do; and the CPU seconds by stage of the quickest one."""
 
     settings: Settings
     images: list[F8] = field(default_factory=list)
     sampled: list[F8] = field(default_factory=list)
     looked_up: list[F8] = field(default_factory=list)
-    brought: list[F8] = field(default_factory=list)
     stages: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -83,11 +80,6 @@ class Attempt:
     shown: list[Run] = field(default_factory=list)
     direct: list[Run] = field(default_factory=list)
     gathered: list[Run] = field(default_factory=list)
-
-    @property
-    def spread(self) -> bool:
-        """Whether gather rays look up wider than usual, as photons lie far apart."""
-        return self.plan.gather and "estimate.radius" in self.candidate.values
 
     @property
     def every(self) -> list[Run]:
@@ -241,7 +233,7 @@ class Trier:
         renderer.step()
         planes = renderer.film.planes()
         run.images.append(beauty_of(planes).astype(np.float64))
-        for terms, images in ((SAMPLED, run.sampled), (LOOKED_UP, run.looked_up), (GATHERED, run.brought)):
+        for terms, images in ((SAMPLED, run.sampled), (LOOKED_UP, run.looked_up)):
             there = [planes[..., PLANES[term]] for term in terms if PLANES[term].stop <= planes.shape[-1]]
             images.append(np.sum(there, axis=0, dtype=np.float64))
         self._in_camera += renderer.tally.stage_seconds.get("camera pass", 0.0)

@@ -3,8 +3,8 @@ wrong.
 
 A pass is rendered with two numbers of photons and two seeds, or more as the time allows, of pixels that are spread over
 the picture, each as large as it will be: larger ones would average the bias of what is narrower than they are away. The
-variance over the seeds is that of a pass. What of it falls with N is the photons' part, what doesn't the camera pass's;
-the times of the stages fall apart in the same way. What either radius does, that of caustics and that of the global map
+variance over the seeds is that of a pass. What of it falls with N, which pictures of the same seed tell, is the photons'
+part, what doesn't the camera pass's; the times of the stages fall apart in the same way. What either radius does, that of caustics and that of the global map
 where it is shown, is told by passes with twice and half of it (`pmviewer.engine.auto.widths`); what look-ups at the
 ends of gather rays lack, by passes with twice of it. `pmviewer.engine.auto.runs` renders the pictures.
 """
@@ -20,7 +20,7 @@ import numpy as np
 from pmviewer.engine.auto.bias import GATHERED_ORDER, Bias, Blur
 from pmviewer.engine.auto.candidates import FARTHER, FARTHER_NAME, GATHER, LESS_BIAS, MORE_COST, Candidate
 from pmviewer.engine.auto.measured import BY_PHOTONS, BY_POWER, Costs, Measured, Trial
-from pmviewer.engine.auto.relative import F8, shown_squared, squared, variance
+from pmviewer.engine.auto.relative import F8, nested, shown_squared, squared, variance
 from pmviewer.engine.auto.runs import MORE, SEEDS, Attempt, Run, Trier
 from pmviewer.engine.auto.widths import HIDDEN, NONE, WIDER, Tried, Widened, told_by
 from pmviewer.engine.opened import OpenScene
@@ -33,8 +33,8 @@ Tell = Callable[[str, float | None], None]
 
 RARE = 2.0
 """What the variance that gather rays bring from photons is multiplied by: bright ones that few rays find are missing
-in nearly all of a few small pictures. With it gathers had 0.57 to 1.7 times the error that was promised of them, 0.9
-times in the median (ten scenes and files, ten CPU seconds). Maps that are shown have none: different radii tell their
+in nearly all of a few small pictures. With it gathers had 0.42 to 2.0 times the error that was promised of them, 1.0
+times in the median (seven scenes and files, eight CPU seconds, two seeds; but office 4 to 5 times with the cache). Maps that are shown have none: different radii tell their
 part to a tenth, in office to a quarter."""
 MOST_DIRECT = 0.9
 """Most of the camera rays' part that light samples are taken to make: edges and surfaces are some of it."""
@@ -135,11 +135,14 @@ def _at_ends(gathers: Attempt, mean: F8) -> Blur:
     return Blur(more / (WIDER**GATHERED_ORDER - 1) ** 2, GATHERED_ORDER)
 
 
-def _of_photons(tried: Attempt, pictures: Callable[[Run], list[F8]], square: F8) -> float:
-    """Variance that the photons of one trajectory make in such pictures, from passes with fewer of them."""
+def _of_photons(tried: Attempt, square: F8) -> float:
+    """Variance that the photons of one trajectory make, from passes with the first few of them. Where photons choose
+    lights, fewer of them choose others, and pictures of the same seed differ by more than that."""
     many, few = tried.runs
-    more = variance(pictures(few), square) - variance(pictures(many), square)
-    return max(more, 0.0) / (1 / few.N - 1 / many.N)
+    found = nested(few.looked_up, many.looked_up, square)
+    if tried.plan.asks_photons:
+        found = min(found, max(variance(few.looked_up, square) - variance(many.looked_up, square), 0.0))
+    return found / (1 / few.N - 1 / many.N)
 
 
 def _farther(gather: Measured) -> Measured:
@@ -160,10 +163,7 @@ def _measured(tried: Attempt, widened: tuple[Widened, Widened], bias: Bias, squa
     if len(tried.runs) > 1:
         many = tried.runs[0]
         told = caustic + shown
-        if tried.spread:  # rare caustics' radii say more of them than fewer photons do, and would leave nothing
-            told += _of_photons(tried, lambda run: run.brought, square)
-        photons = _of_photons(tried, lambda run: run.looked_up, square)
-        photons = min(max(photons, told), variances[0] * many.N)
+        photons = min(max(_of_photons(tried, square), told), variances[0] * many.N)
         eye = variances[0] - photons / many.N
         fitting = min(1.0, photons / told) if told > 0 else 1.0
         caustic, shown = caustic * fitting, shown * fitting
@@ -177,7 +177,7 @@ def _sampled(measured: Measured, source: Attempt, square: F8, scale: float) -> M
     terms that they make: the noise of others would hide it. Samples of a pass complement one another as passes do."""
     usual, many = source.runs[-1], source.direct[0]
     complement = BY_PHOTONS if source.plan.asks_photons else BY_POWER
-    direct = max(variance(usual.sampled, square) - variance(many.sampled, square), 0.0) / (1 - MORE**-complement)
+    direct = nested(usual.sampled, many.sampled, square) / (1 - MORE**-complement)
     spent = max(many.stages["camera pass"] - usual.stages["camera pass"], 0.0) * scale / (MORE - 1)
     costs = replace(measured.costs, sampled=spent)
     return replace(measured, direct=min(direct, MOST_DIRECT * measured.eye), complement=complement, costs=costs)
