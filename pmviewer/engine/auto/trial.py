@@ -3,10 +3,11 @@ wrong.
 
 A pass is rendered with two numbers of photons and two seeds, or more as the time allows, of pixels that are spread over
 the picture, each as large as it will be: larger ones would average the bias of what is narrower than they are away. The
-variance over the seeds is that of a pass. What of it falls with N, which pictures of the same seed tell, is the photons'
-part, what doesn't the camera pass's; the times of the stages fall apart in the same way. What either radius does, that of caustics and that of the global map
-where it is shown, is told by passes with twice and half of it (`pmviewer.engine.auto.widths`); what look-ups at the
-ends of gather rays lack, by passes with twice of it. `pmviewer.engine.auto.runs` renders the pictures.
+variance over the seeds is that of a pass. What of it falls with N, which pictures of the same seed tell, is the
+photons' part, what doesn't the camera pass's; the times of the stages fall apart in the same way. What either radius
+does, that of caustics and that of the global map where it is shown, is told by passes with twice and half of it
+(`pmviewer.engine.auto.widths`); what look-ups at the ends of gather rays lack, by passes with twice of it.
+`pmviewer.engine.auto.runs` renders the pictures.
 """
 
 from __future__ import annotations
@@ -32,10 +33,10 @@ from pmviewer.settings.access import Settings, with_values
 Tell = Callable[[str, float | None], None]
 
 RARE = 2.0
-"""What the variance that gather rays bring from photons is multiplied by: bright ones that few rays find are missing
-in nearly all of a few small pictures. With it gathers had 0.42 to 2.0 times the error that was promised of them, 1.0
-times in the median (seven scenes and files, eight CPU seconds, two seeds; but office 4 to 5 times with the cache). Maps that are shown have none: different radii tell their
-part to a tenth, in office to a quarter."""
+"""What the variance that gather rays bring from photons is multiplied by: bright ones that few rays find are missing in
+nearly all of a few small pictures. With it gathers had 0.42 to 2.0 times the error that was promised of them, 1.0 times
+in the median (seven scenes and files, eight CPU seconds, two seeds; but office 4 to 5 times with the cache). Maps that
+are shown have none: different radii tell their part to a tenth, in office to a quarter."""
 MOST_DIRECT = 0.9
 """Most of the camera rays' part that light samples are taken to make: edges and surfaces are some of it."""
 BLOCK = 4
