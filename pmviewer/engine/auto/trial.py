@@ -34,9 +34,9 @@ Tell = Callable[[str, float | None], None]
 
 RARE = 2.0
 """What the variance that gather rays bring from photons is multiplied by: bright ones that few rays find are missing in
-nearly all of a few small pictures. With it gathers had 0.42 to 2.0 times the error that was promised of them, 1.0 times
-in the median (seven scenes and files, eight CPU seconds, two seeds; but office 4 to 5 times with the cache). Maps that
-are shown have none: different radii tell their part to a tenth, in office to a quarter."""
+nearly all of a few small pictures. With it gathers had 0.42 to 1.9 times the error that was promised of them, 1.0 times
+in the median (seven scenes and files, eight CPU seconds, two seeds, less the references' noise). Maps that are shown
+have none: different radii tell their part to a tenth, in office to a quarter."""
 MOST_DIRECT = 0.9
 """Most of the camera rays' part that light samples are taken to make: edges and surfaces are some of it."""
 BLOCK = 4
