@@ -70,7 +70,9 @@ def told_by(wide: Tried, usual: Tried, narrow: Tried, square: F8, hidden: float 
     the mean of four 1.0 to 1.2 times.) `hidden`: how much of the difference of the wide and the usual radius is taken
     to be there, at most, where noise may hide it."""
     span = WIDER**2 - 1 / WIDER**2
-    noise = max(variance(narrow.images, square) - variance(wide.images, square), 0.0) / span
+    # A disc holds the photons of narrower ones: their difference has the variance by which theirs differ, and nothing
+    # else's noise.
+    noise = variance([a - b for a, b in zip(narrow.images, wide.images, strict=True)], square) / span
     least = np.mean(narrow.images, axis=0)
     above = difference(wide.images, usual.images, least)
     below = difference(usual.images, narrow.images, least)
