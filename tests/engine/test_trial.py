@@ -40,12 +40,14 @@ def beyond(x: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("kind", ["outline", "open"])
 def test_radii_are_told_by_passes_with_others(kind, seeds):
     """Made-up pictures of light that ends at a straight line, blurred by discs, or is wrong by the square of the radius
-    everywhere, and noise of photons that is less in wider ones."""
+    everywhere, and noise of photons that is less in wider ones, which hold those of the narrower."""
     rng = np.random.default_rng(5)
     across = np.tile(np.arange(-100, 100) + 0.5, (60, 1))[:, :, None].repeat(3, axis=2)
     truth = 0.6 + 0.4 * (across < 0) if kind == "outline" else np.full(across.shape, 0.8)
     camera = [rng.normal(0, 0.01, truth.shape) for _ in range(seeds)]
-    photons = [rng.normal(0, 0.01, truth.shape) for _ in range(seeds)]
+    areas = {0.5: 0.25, 1.0: 1.0, 2.0: 4.0}
+    rings = [[rng.normal(0, 0.01 * math.sqrt(a), truth.shape) for a in (0.25, 0.75, 3.0)] for _ in range(seeds)]
+    photons = [dict(zip(areas, np.cumsum(parts, axis=0), strict=True)) for parts in rings]
 
     def blurred(width: float) -> np.ndarray:
         if kind == "outline":
@@ -56,7 +58,7 @@ def test_radii_are_told_by_passes_with_others(kind, seeds):
         return float(((blurred(width) - truth) ** 2 / (truth**2 + EPSILON)).mean())
 
     def tried(width: float) -> Tried:
-        images = [blurred(width) + e + p / width for e, p in zip(camera, photons, strict=True)]
+        images = [blurred(width) + e + p[width] / areas[width] for e, p in zip(camera, photons, strict=True)]
         return Tried(images, 0.1 + 0.01 * width**2)
 
     found = told_by(tried(2.0), tried(1.0), tried(0.5), np.full(truth.shape, 0.64))
