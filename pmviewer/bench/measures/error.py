@@ -249,20 +249,32 @@ def plot(curves: list[Curve], path: Path) -> str:
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    figure, axes = pyplot.subplots(2, 2, figsize=(11, 8), sharey=True, layout="constrained")
+    figure, axes = pyplot.subplots(2, 2, figsize=(11, 10), sharey=True, layout="constrained")
     for axis, scene in zip(axes.flat, SCENES, strict=True):
-        for curve in curves:
-            if curve.scene == scene:
-                axis.loglog(
-                    curve.cpu, curve.error, marker="o", markersize=3, label=f"{curve.method} ({curve.slope:.2f})"
-                )
+        chosen = 0
+        for curve in (curve for curve in curves if curve.scene == scene):
+            if curve.method in METHODS:
+                number = METHODS.index(curve.method)
+            elif curve.method.startswith(AUTOMATIC):
+                number, chosen = len(METHODS) + chosen, chosen + 1
+            else:
+                number = len(METHODS) + 2
+            label = f"{curve.method} ({curve.slope:.2f})"
+            axis.loglog(curve.cpu, curve.error, marker="o", markersize=3, color=f"C{number}", label=label)
         for target, of_scene, error, bound, _ in TARGETS:
             if of_scene == scene:
                 axis.plot(bound, error, "x", color="black")
                 axis.annotate(target, (bound, error), textcoords="offset points", xytext=(5, 5))
         axis.set(title=scene, xlabel="CPU seconds", ylabel="relMSE")
         axis.grid(alpha=0.3)
-        axis.legend(title="method (slope)")
+        axis.legend(
+            title="method (slope)",
+            loc="upper center",
+            bbox_to_anchor=(0.5, -0.13),
+            ncols=2,
+            fontsize="small",
+            frameon=False,
+        )
     figure.savefig(path, dpi=120)
     pyplot.close(figure)
     return f"plot written to {path}"
