@@ -35,9 +35,9 @@ def variance(images: list[F8], square: F8) -> float:
 
 
 def nested(few: list[F8], many: list[F8], square: F8) -> float:
-    """What the variance of such pictures falls by where fewer random numbers are continued to more, seed by seed. If
-    these leave the less they are the more they become, the mean of all is as near to any part's as two means that
-    differ by just that variance: all other noise is the same in both and in none of the differences."""
+    """By how much the variance of pictures falls where the `few` random numbers that make part of it are continued to
+    `many`, seed by seed. X being a mean of the first of them and Y that of all, cov(X, Y) = var Y, so that the mean of
+    (X − Y)² is var X − var Y; all other noise is the same in both, and cancels."""
     return _of_most(np.mean([(a - b) ** 2 for a, b in zip(few, many, strict=True)], axis=0) / (square + EPSILON))
 
 
