@@ -47,22 +47,22 @@ MOST_PASSES = 3000
 LEAST_KNOWN = 0.1
 """Of the noise of a reference: errors below that are not told by it."""
 CHOSEN = (
-    "; what a trial takes bias relative to, how far it trusts it, and how noise is taken to fall, was chosen with "
-    "cornell_caustic too"
+    "; what a trial takes bias relative to, how far it trusts it, how noise is taken to fall, that fewer photons need "
+    "not promise less, and how few light samples are preferred, was chosen with cornell_caustic too"
 )
-"""The denominator and SPREAD of `pmviewer.engine.auto.widths`, the powers of `pmviewer.engine.auto.model` and
-`measured`, said in the target's own line."""
+"""The denominator and SPREAD of `pmviewer.engine.auto.widths`, the powers and EVEN of `pmviewer.engine.auto.model`, the
+powers of `measured`, and where FEWER_PHOTONS of `choose` does not count, said in the target's own line."""
 CHOSEN_WAYS = (
     "; what every way of such scenes has, such as caustics of lights alone and photons' roulette, light samples with "
     "several lights, the choice of lights by distance, how noise is taken to fall, how wide radii that wait may be, "
-    "what photons shown directly have to promise, and how many photons look-ups of maps that are shown hold at first "
-    "were chosen with these scenes too, and how wide gather rays' look-ups are where photons lie far apart with four "
-    "of them"
+    "what photons shown directly have to promise, how few light samples are preferred, and how many photons look-ups "
+    "of maps that are shown hold at first were chosen with these scenes too, and how wide gather rays' look-ups are "
+    "where photons lie far apart with four of them"
 )
 """CHANNEL_ROULETTE, LIGHTS_CAUSTICS, THICKER and WIDE_RECORDS of `pmviewer.engine.auto.candidates`, SEVERAL of
-`pmviewer.render.direct.samples`, the automatic `direct.choice`, the powers of `pmviewer.engine.auto.model` and
-`measured`, that its radii are as wide for a time as for an error, SHOWN of `candidates`, HELD and
-CAUSTIC_HELD of `pmviewer.engine.stages.spread`, and HELD and MOST of `pmviewer.engine.auto.sparse`, likewise."""
+`pmviewer.render.direct.samples`, the automatic `direct.choice`, the powers and EVEN of `pmviewer.engine.auto.model`,
+those of `measured`, that its radii are as wide for a time as for an error, SHOWN of `candidates`, HELD and CAUSTIC_HELD
+of `pmviewer.engine.stages.spread`, and HELD and MOST of `pmviewer.engine.auto.sparse`, likewise."""
 CHOSEN_BIAS = "; the least and most that the bias may be were chosen with cornell_caustic"
 """TRUE_BIAS of `pmviewer.engine.auto.estimate`, likewise."""
 

@@ -47,35 +47,28 @@ BUDGETS = {"cornell_diffuse": 8.0, "cornell_caustic": 24.0, "ring_caustic": 8.0,
 QUICK_SHARE = 0.1
 PEER_BUDGET = 2.5
 """Mitsuba's budget over ours: its time to a target must be found where it is twice ours."""
-PEER = "Mitsuba 3 path"
+PEER, PEER_COLOUR = "Mitsuba 3 path", "black"
 AUTOMATIC, TRIAL_APART = "automatic", ", its trial not counted"
-CHOSEN = (
-    "; what a trial takes bias relative to, how far it trusts it, that caustics are those of lights, and that narrow "
-    "radii come first, was chosen with this scene among others"
+AMONG = "was chosen with this scene among others"
+CHOSEN_WITH = (
+    (
+        ("cornell_caustic", "ring_caustic"),
+        "what a trial takes bias relative to, how far it trusts it, that caustics are those of lights, and that narrow "
+        "radii come first",
+    ),
+    (("cornell_caustic", "cornell_diffuse", "rooms_10x10"), "photons' roulette"),
+    (("cornell_caustic", "cornell_diffuse", "rooms_10x10"), "how noise is taken to fall"),
+    (
+        ("cornell_caustic", "cornell_diffuse", "rooms_10x10"),
+        "that fewer photons need not promise less than others, and how few light samples are preferred",
+    ),
 )
-CHOSEN_WITH = ("ring_caustic", "cornell_caustic")
-"""Scenes by which the denominator and SPREAD of `pmviewer.engine.auto.widths`, UNSURE and MISSED of
-`pmviewer.engine.auto.model`, LIGHTS_CAUSTICS of `pmviewer.engine.auto.candidates`, and what
-`pmviewer.engine.auto.choose` prefers were chosen: said in their targets' lines."""
-ROULETTE = "; photons' roulette was chosen with this scene among others"
-ROULETTE_WITH = ("cornell_caustic", "cornell_diffuse", "rooms_10x10")
-"""Scenes by which CHANNEL_ROULETTE of `pmviewer.engine.auto.candidates` was chosen, likewise."""
-HELD = (
-    "; how many photons look-ups of maps that are shown hold at first, and how few trajectories tell it, was chosen "
-    "with this scene among others"
-)
-HELD_WITH = ("cornell_diffuse", "cornell_caustic", "ring_caustic", "rooms_10x10")
-"""HELD, CAUSTIC_HELD and FEW_TRACED of `pmviewer.engine.stages.spread`, likewise."""
-FALL = "; how noise is taken to fall was chosen with this scene among others"
-FALL_WITH = ("cornell_caustic", "rooms_10x10")
-"""Scenes by which the powers of `pmviewer.engine.auto.model` and `measured` were chosen, likewise."""
-PREFERRED = (
-    "; that fewer photons need not promise less than others, and how few light samples are preferred, was chosen with "
-    "this scene among others"
-)
-PREFERRED_WITH = ("cornell_diffuse", "cornell_caustic", "rooms_10x10")
-"""Scenes by which EVEN of `pmviewer.engine.auto.model` was chosen, and where FEWER_PHOTONS of
-`pmviewer.engine.auto.choose` does not count, likewise."""
+"""What of automatic mode was chosen with which scenes, said in their targets' lines: the denominator and SPREAD of
+`pmviewer.engine.auto.widths`, UNSURE and MISSED of `pmviewer.engine.auto.model`, LIGHTS_CAUSTICS of
+`pmviewer.engine.auto.candidates`, and what `pmviewer.engine.auto.choose` prefers; CHANNEL_ROULETTE of `candidates`; the
+powers of `model` and `measured`; that FEWER_PHOTONS of `choose` does not count for an error, and EVEN of `model`."""
+HELD = "how many photons look-ups of maps that are shown hold at first, and how few trajectories tell it"
+"""HELD, CAUSTIC_HELD and FEW_TRACED of `pmviewer.engine.stages.spread`: with all of `SCENES`, and for every method."""
 AUTOMATIC_BUDGET = 8.0
 """Of the curves by what automatic mode chooses, over their target's seconds."""
 
@@ -184,17 +177,25 @@ def automatic(scene: str, error: float, budget: float) -> tuple[Curve, str]:
     return replace(curve, method=f"{AUTOMATIC} for {error:g}"), said
 
 
+def chosen_with(best: Curve) -> str:
+    """What of a curve's way of rendering was chosen with its scene, as an end of its target's line."""
+    by_choice = best.method.startswith(AUTOMATIC)
+    found = [what for scenes, what in CHOSEN_WITH if by_choice and best.scene in scenes]
+    return (TRIAL_APART if by_choice else "") + "".join(f"; {what} {AMONG}" for what in (*found, HELD))
+
+
 def against_peer(curves: list[Curve], peers: list[Curve]) -> list[Target]:
     """Our best time over Mitsuba's for each target; where its budget ran out first, an upper bound of the ratio."""
     targets = []
     for target, scene, error, _, share in TARGETS:
-        ours = min(c.time_to(error) for c in curves if c.scene == scene)
+        best = min((c for c in curves if c.scene == scene), key=lambda c: c.time_to(error))
         curve = next(c for c in peers if c.scene == scene)
         theirs = curve.time_to(error)
         note = f"of the time of {curve.method} to relMSE {error:g} on {scene}"
         if not math.isfinite(theirs):
             theirs, note = curve.cpu[-1], note + f", which it did not reach within {curve.cpu[-1]:.3g} CPU s"
-        targets.append(Target(f"{target} peer", ours / theirs, share, "", False, note))
+        note += f"; {best.method}{chosen_with(best)}"
+        targets.append(Target(f"{target} peer", best.time_to(error) / theirs, share, "", False, note))
     return targets
 
 
@@ -223,14 +224,7 @@ def run(quick: bool = False) -> BenchResult:
     targets = []
     for target, scene, error, bound, _ in TARGETS:
         best = min((c for c in curves if c.scene == scene), key=lambda c: c.time_to(error))
-        apart = TRIAL_APART if best.method.startswith(AUTOMATIC) else ""
-        if apart:
-            apart += CHOSEN if scene in CHOSEN_WITH else ""
-            apart += ROULETTE if scene in ROULETTE_WITH else ""
-            apart += FALL if scene in FALL_WITH else ""
-            apart += PREFERRED if scene in PREFERRED_WITH else ""
-        note = f"{scene} to relMSE {error:g}, best: {best.method}{apart}"
-        note += HELD if scene in HELD_WITH else ""
+        note = f"{scene} to relMSE {error:g}, best: {best.method}{chosen_with(best)}"
         targets.append(Target(target, best.time_to(error), bound, "CPU s", False, note))
     if peers:
         targets += against_peer(curves, peers)
@@ -251,16 +245,10 @@ def plot(curves: list[Curve], path: Path) -> str:
 
     figure, axes = pyplot.subplots(2, 2, figsize=(11, 10), sharey=True, layout="constrained")
     for axis, scene in zip(axes.flat, SCENES, strict=True):
-        chosen = 0
-        for curve in (curve for curve in curves if curve.scene == scene):
-            if curve.method in METHODS:
-                number = METHODS.index(curve.method)
-            elif curve.method.startswith(AUTOMATIC):
-                number, chosen = len(METHODS) + chosen, chosen + 1
-            else:
-                number = len(METHODS) + 2
+        for number, curve in enumerate(curve for curve in curves if curve.scene == scene):
+            colour = PEER_COLOUR if curve.method.startswith(PEER) else f"C{number}"
             label = f"{curve.method} ({curve.slope:.2f})"
-            axis.loglog(curve.cpu, curve.error, marker="o", markersize=3, color=f"C{number}", label=label)
+            axis.loglog(curve.cpu, curve.error, marker="o", markersize=3, color=colour, label=label)
         for target, of_scene, error, bound, _ in TARGETS:
             if of_scene == scene:
                 axis.plot(bound, error, "x", color="black")

@@ -33,8 +33,8 @@ NEARLY = 1.1
 FEWER_PHOTONS = 1.15
 """What an error promised by fewer photons than the default number counts as: a trial does not meet the bright ones that
 few pixels meet. With `NEARLY` they have to promise a fifth less. (A living room with N = 50,000: 1.8 times the error of
-150,000, four seeds, where trials promised less.) Not where an error is asked for, as what is missing costs time there,
-which a picture without it has: `rooms_10x10` is at 1e-2 with N = 50,000 in 0.6 of the time of 150,000."""
+150,000, four seeds, where trials promised less.) Not where an error is asked for: there too few cost time and no light,
+as rendering goes on. `rooms_10x10` is at 1e-2 with N = 50,000 in 0.6 of the time of 150,000."""
 ADAPTIVE = {"render.adaptive": "on"}
 ADAPTED = f"from pass {DECIDED_AFTER + 1} on pixels with noise of their own get more samples (render.adaptive)"
 _DEFAULT = Numbers(SETTINGS["photons.N"].default)

@@ -83,10 +83,10 @@ class Costs:
 @dataclass(frozen=True)
 class Measured:
     """Relative variances of a pass: `eye` what photons don't decide, `direct` as much of it as falls with the power
-    `complement` of light samples and passes; of one trajectory, `caustic` what
-    look-ups of caustics decide, `shown` those of a global map that is shown, `gathered` the rest. `bias`: of the first
-    pass. `first`: radii of the first pass, relative to the scene. `covered`: share of the light that photons for the
-    caustic map alone start in, 0 where there are none."""
+    `complement` of light samples and passes; of one trajectory, `caustic` what look-ups of caustics decide, `shown`
+    those of a global map that is shown, `gathered` the rest. `bias`: of the first pass. `first`: radii of the first
+    pass, relative to the scene. `covered`: share of the light that photons for the caustic map alone start in, 0 where
+    there are none."""
 
     candidate: Candidate
     costs: Costs
