@@ -49,7 +49,6 @@ PEER_BUDGET = 2.5
 """Mitsuba's budget over ours: its time to a target must be found where it is twice ours."""
 PEER, PEER_COLOUR = "Mitsuba 3 path", "black"
 AUTOMATIC, TRIAL_APART = "automatic", ", its trial not counted"
-AMONG = "was chosen with this scene among others"
 CHOSEN_WITH = (
     (
         ("cornell_caustic", "ring_caustic"),
@@ -181,7 +180,7 @@ def chosen_with(best: Curve) -> str:
     """What of a curve's way of rendering was chosen with its scene, as an end of its target's line."""
     by_choice = best.method.startswith(AUTOMATIC)
     found = [what for scenes, what in CHOSEN_WITH if by_choice and best.scene in scenes]
-    return (TRIAL_APART if by_choice else "") + "".join(f"; {what} {AMONG}" for what in (*found, HELD))
+    return (TRIAL_APART if by_choice else "") + "; chosen with this scene among others: " + "; ".join((*found, HELD))
 
 
 def against_peer(curves: list[Curve], peers: list[Curve]) -> list[Target]:
