@@ -74,9 +74,9 @@ def follow(scene, si, beta, u_lobe, u, v):
 
 
 @device
-def follow_camera_path(scene, eye, si, beta, seed, depth):
+def follow_camera_path(scene, eye, si, beta, u, seed, depth):
     """`follow` at the surface number `depth` of a path from the camera, and the number by which the path is thinned out
-    beyond the next surface where it forks (`pmviewer.render.split.thinned`), CERTAIN where it does not."""
+    from then on (`pmviewer.render.split.thinned`): a new one where it forks, else u that it had."""
     u_lobe, u, v, u_end = chain_numbers(scene, eye.sequence, seed, eye.index, CHAIN + depth)
     ray, beta, pdf = follow(scene, si, beta, u_lobe, u, v)
-    return ray, beta, pdf, u_end if si.bsdf.groups & STORED != 0 else CERTAIN
+    return ray, beta, pdf, u_end if si.bsdf.groups & STORED != 0 else u

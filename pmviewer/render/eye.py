@@ -31,6 +31,7 @@ from pmviewer.render.direct.direct import direct_light, found_light, met_light, 
 from pmviewer.render.filter_samples import place_of, seen_at, sum_at, value_at
 from pmviewer.render.gather.cached import cached, surface_rays
 from pmviewer.render.gather.guide import AIM_WORDS, aim
+from pmviewer.render.gather.weak import shows_map
 from pmviewer.render.given import Aim, GatherRays, Sampler, opened
 from pmviewer.render.hidden_lights import hides_lights
 from pmviewer.render.media.volume import deposit_media
@@ -49,7 +50,7 @@ from pmviewer.render.pixel import (
 )
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, count_found, own_radius, radii_of
 from pmviewer.render.pixel_samples import OUTLINED, samples_of, share_of, take_sample
-from pmviewer.render.reflect import reflected, unfound
+from pmviewer.render.reflect import gathered, reflected, unfound
 from pmviewer.render.share import OWN_COLUMNS
 from pmviewer.render.split import first_way, next_way, split_camera_path, thinned
 from pmviewer.render.straight import cast_on
@@ -296,10 +297,13 @@ def eye_pass(given, marks, radii, film, counts, first, last):
                     if met_light(scene, hit) >= 0 and not (whole and unseen):
                         deposit(pixel, seen, mul(beta, _emission(scene, eye, left, pdf, choice, hit, ray.d)))
                     groups = si.bsdf.groups
-                    beta = thinned(beta, u_way)
+                    by_map = shows_map(given, si, beta, u_way, hit.t)
+                    if by_map:
+                        deposit(pixel, SPECULAR, mul(beta, gathered(given, si)))
+                    beta = thinned(beta, u_way, groups)
                     if groups == NOTHING or not largest(beta) > _f4(0.0):
                         break
-                    if groups & STORED != 0:
+                    if groups & STORED != 0 and not by_map:
                         choice = _stored(given, si, beta, pixel, (lights, found), whole)
                     if groups & FOLLOWED == 0:
                         break
@@ -309,7 +313,7 @@ def eye_pass(given, marks, radii, film, counts, first, last):
                     if not is_delta(si.bsdf):
                         choice = _followed(given, si, beta, pixel, depth, choice, lights)
                     ray, beta, pdf, u_way, splits, ways = split_camera_path(
-                        scene, eye, si, beta, seed, depth, splits, ways
+                        scene, eye, si, beta, u_way, seed, depth, splits, ways
                     )
                     if eye.followed_direct == 0:
                         pdf = _f4(0.0)

@@ -3,13 +3,13 @@ random.
 
 At the first `splits` such surfaces of a path both ways are followed, weighted by the share R of the light that is
 reflected and by 1 − R. The stronger goes on, the other waits until the path has ended. What a weak way brings hardly
-counts unless it is a light, and the first surface on it tells: emission there counts as it is, and beyond that the way
-is thinned out by roulette with the probability w/THINNING, w being its throughput. So the reflection of a lamp on a
-glass ball, which a choice would hit with 4 % of the samples at 25 times its weight, is seen by all, for little more
-than a ray.
+counts unless it is a light: emission counts as it is, over mirrors and glass and on the first surface with STORED
+lobes, where it is dear to say more. There the way is thinned out by roulette with the probability w/THINNING, w being
+its throughput. So the reflection of a lamp on a glass ball, which a choice would hit with 4 % of the samples at 25
+times its weight, is seen by all, for little more than a ray. Where the method gathers, the global map tells the rest
+(`pmviewer.render.gather.weak`).
 
-What a surface with lobes of both kinds reflects beside what it scatters, varnish say, is thinned out likewise beyond
-the next surface. A room of varnished wood takes two thirds of the time for an eighth more noise.
+What a surface with lobes of both kinds reflects beside what it scatters, varnish say, is a weak way likewise.
 
 Eye records without the field `splits` split nothing, and compile none of it.
 """
@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pmviewer.kernels.bsdf.scattering import chain_numbers, mirrored_share
+from pmviewer.kernels.bsdf.scattering import STORED, chain_numbers, mirrored_share
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.dimensions import CHAIN
@@ -82,41 +82,49 @@ def next_way(ways):
 
 
 @specialised
-def split_camera_path(scene, eye, si, beta, seed, depth, splits, ways):
-    """`follow_camera_path`, or both ways: the ray, beta, the density, the number for roulette beyond the next surface,
-    the splits so far and the ways that wait."""
+def split_camera_path(scene, eye, si, beta, u, seed, depth, splits, ways):
+    """`follow_camera_path`, or both ways: the ray, beta, the density, the number for roulette, the splits so far and
+    the ways that wait."""
     if not has(eye, "splits"):
 
-        def one(scene, eye, si, beta, seed, depth, splits, ways):
-            ray, beta, pdf, u = follow_camera_path(scene, eye, si, beta, seed, depth)
+        def one(scene, eye, si, beta, u, seed, depth, splits, ways):
+            ray, beta, pdf, u = follow_camera_path(scene, eye, si, beta, u, seed, depth)
             return ray, beta, pdf, u, splits, ways
 
         return one
 
-    def both(scene, eye, si, beta, seed, depth, splits, ways):
+    def both(scene, eye, si, beta, u, seed, depth, splits, ways):
         share = _ONE
         if splits < eye.splits:
             share = mirrored_share(scene, si.bsdf, si.wo)
         if not (share > _ZERO and share < _ONE):
-            ray, beta, pdf, u = follow_camera_path(scene, eye, si, beta, seed, depth)
+            ray, beta, pdf, u = follow_camera_path(scene, eye, si, beta, u, seed, depth)
             return ray, beta, pdf, u, splits, ways
         mirrored, reflected, _ = follow(scene, si, beta, _ZERO, _ZERO, _ZERO)
         bent, refracted, _ = follow(scene, si, beta, _BELOW_ONE, _BELOW_ONE, _ZERO)
         reflected, refracted = scale(reflected, share), scale(refracted, _ONE - share)
-        _, u, _, _ = chain_numbers(scene, eye.sequence, seed, eye.index, CHAIN + depth)
+        _, another, _, _ = chain_numbers(scene, eye.sequence, seed, eye.index, CHAIN + depth)
         if share > _HALF:
-            ways = _waiting(ways, Way(bent, refracted, _i8(depth + 1), splits + 1, u))
-            return mirrored, reflected, _ZERO, CERTAIN, splits + 1, ways
-        ways = _waiting(ways, Way(mirrored, reflected, _i8(depth + 1), splits + 1, u))
-        return bent, refracted, _ZERO, CERTAIN, splits + 1, ways
+            ways = _waiting(ways, Way(bent, refracted, _i8(depth + 1), splits + 1, another))
+            return mirrored, reflected, _ZERO, u, splits + 1, ways
+        ways = _waiting(ways, Way(mirrored, reflected, _i8(depth + 1), splits + 1, another))
+        return bent, refracted, _ZERO, u, splits + 1, ways
 
     return both
 
 
 @device
-def thinned(beta, u):
-    """beta beyond the first surface of a way with that number for roulette; black where the way ends."""
-    survival = largest(beta) / _THINNING
-    if u < _ZERO or survival >= _ONE:
+def is_weak(beta, u):
+    """Whether a way with that throughput and number for roulette is thinned out where there is more to it than a
+    mirror or glass."""
+    return u >= _ZERO and largest(beta) < _THINNING
+
+
+@device
+def thinned(beta, u, groups):
+    """beta at a surface whose BSDF has these groups of lobes, after a way with that number for roulette; black where
+    the way ends."""
+    if groups & STORED == 0 or not is_weak(beta, u):
         return beta
+    survival = largest(beta) / _THINNING
     return scale(beta, _ONE / survival) if u < survival else BLACK

@@ -37,6 +37,7 @@ from pmviewer.render.diagnostics.pixel_replay import (
     GATHERED,
     NOT_FOUND,
     OF_CAUSTICS,
+    WEAKLY,
     as_lit,
     as_look_ups,
     empty_lights,
@@ -57,6 +58,7 @@ _SHOWS = {
     AS_CAUSTICS: "caustic",
     NOT_FOUND: "specular",
     GATHERED: "indirect",
+    WEAKLY: "specular",
 }
 Shares = Callable[[int, int, NDArray[np.float32]], NDArray[np.float32]]
 

@@ -18,20 +18,22 @@ from pmviewer.render.cast import cast
 from pmviewer.render.chain import arrive
 from pmviewer.render.direct.choice import LIST_WORDS, expected_samples
 from pmviewer.render.direct.choose import choose
+from pmviewer.render.gather.weak import shows_map
 from pmviewer.render.given import opened
 from pmviewer.render.pixel import sampled_ray
 from pmviewer.render.pixel_radius import OF_CAUSTIC, OF_GLOBAL, own_radius, radii_of
 from pmviewer.render.pixel_samples import take_sample
-from pmviewer.render.reflect import reflected, unfound
+from pmviewer.render.reflect import gathered, reflected, unfound
 from pmviewer.render.split import first_way, next_way, split_camera_path, thinned
 from pmviewer.render.straight import let_through
 from pmviewer.render.virtual_lights.descent import CUT_WORDS
 from pmviewer.render.virtual_lights.lit import asked_for, asked_light, one_light
 from pmviewer.render.virtual_lights.walk import share_of_rays
 
-OF_CAUSTICS, AS_INDIRECT, AS_DIRECT, AS_CAUSTICS, NOT_FOUND, GATHERED = range(6)
+OF_CAUSTICS, AS_INDIRECT, AS_DIRECT, AS_CAUSTICS, NOT_FOUND, GATHERED, WEAKLY = range(7)
 """What a look-up is for: the caustic map; the global map as indirect light, as direct light, as caustics; the caustic
-map by the FOLLOWED lobes (`pmviewer.render.reflect.unfound`); and the global map where the pixel gathers instead."""
+map by the FOLLOWED lobes (`pmviewer.render.reflect.unfound`); the global map where the pixel gathers instead; and the
+global map on a weak way (`pmviewer.render.gather.weak`)."""
 ROW = np.dtype(
     [
         ("p", "f4", 3),
@@ -215,14 +217,22 @@ def replay_pixel(given, radii, asked, wi, shares, rows, vertices, prims, expecte
                     points += 1
                 si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
                 groups = si.bsdf.groups
-                beta = thinned(beta, u)
-                if groups == NOTHING or not largest(beta) > _f4(0.0):
+                by_map = shows_map(given, si, beta, u, hit.t)
+                beyond = thinned(beta, u, groups)
+                if groups == NOTHING or not (by_map or largest(beyond) > _f4(0.0)):
                     break
                 surface += 1
                 if surface == asked[2]:
                     _shares(si, asked[3], wi, shares)
+                if by_map:
+                    what = _i8(WEAKLY), _i8(ALL_CLASSES), _i8(depth), _i8(0), surface
+                    taken = scale(beta, _f4(1.0) / _f4(samples))
+                    row = _put(rows, row, si, taken, gathered(given, si), eye.global_radius, what)
+                beta = beyond
+                if not largest(beta) > _f4(0.0):
+                    break
                 taken = scale(beta, _f4(1.0) / _f4(samples))
-                if groups & STORED != 0:
+                if groups & STORED != 0 and not by_map:
                     if main and eye.direct != 0 and counts[2] == 0:
                         _expected(given, si, expected)
                         counts[2] = depth + 1
@@ -235,7 +245,7 @@ def replay_pixel(given, radii, asked, wi, shares, rows, vertices, prims, expecte
                     L = unfound(given.caustic_map, eye, r, si)
                     both = _i8(1) if transmits(si.bsdf) else _i8(0)
                     row = _put(rows, row, si, taken, L, r, (_i8(NOT_FOUND), _i8(_CAUSTICS), _i8(depth), both, surface))
-                ray, beta, _, u, splits, ways = split_camera_path(scene, eye, si, beta, seed, depth, splits, ways)
+                ray, beta, _, u, splits, ways = split_camera_path(scene, eye, si, beta, u, seed, depth, splits, ways)
                 if not largest(beta) > _f4(0.0):
                     break
             main = False

@@ -37,6 +37,7 @@ from pmviewer.render.cast import cast, medium_towards, ray_from
 from pmviewer.render.chain import BLACK, CERTAIN, WHITE, arrive, follow_camera_path
 from pmviewer.render.counts import C_DROPPED, C_RAYS
 from pmviewer.render.gather.gather import gather_light
+from pmviewer.render.gather.weak import shows_map
 from pmviewer.render.given import opened
 from pmviewer.render.pixel import pixel_seed, sampled_ray
 from pmviewer.render.split import thinned
@@ -87,10 +88,11 @@ def uncovered_hit(given, pixel, counts):
             break
         travelled += hit.t
         si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
-        beta = thinned(beta, u)
+        by_map = shows_map(given, si, beta, u, hit.t)
+        beta = thinned(beta, u, si.bsdf.groups)
         if not largest(beta) > _f4(0.0):
             break
-        if si.bsdf.groups & STORED != 0 and is_lambertian(si.bsdf):
+        if si.bsdf.groups & STORED != 0 and is_lambertian(si.bsdf) and not by_map:
             n = shading_normal(si.bsdf)
             _, weight, _ = interpolate(cache, si.p, n)
             if weight < ENOUGH:
@@ -98,7 +100,7 @@ def uncovered_hit(given, pixel, counts):
                 return True, Origin(si.p, si.ng, n, si.gap, medium_towards(si, si.ng)), footprint
         if si.bsdf.groups & FOLLOWED == 0 or depth == eye.max_depth:
             break
-        ray, beta, _, u = follow_camera_path(given.scene, given.eye, si, beta, seed, depth)
+        ray, beta, _, u = follow_camera_path(scene, eye, si, beta, u, seed, depth)
         if not largest(beta) > _f4(0.0):
             break
     return False, Origin(BLACK, BLACK, BLACK, _f4(0.0), no_medium(scene)), _f4(0.0)

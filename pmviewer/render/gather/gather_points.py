@@ -12,6 +12,7 @@ from pmviewer.render.cast import cast
 from pmviewer.render.chain import BLACK, arrive
 from pmviewer.render.gather.gather import gather_light, gather_survival
 from pmviewer.render.gather.guide import AIM_WORDS, aim, gather_direction
+from pmviewer.render.gather.weak import shows_map
 from pmviewer.render.given import GatherRays, opened
 from pmviewer.render.pixel import sampled_ray
 from pmviewer.render.pixel_samples import take_sample
@@ -71,14 +72,15 @@ def gather_points(given, pixel, samples, counts, rows):
                 if hit.prim < 0:
                     break
                 si, beta = arrive(scene, eye.glossy, ray.d, hit, beta)
-                beta = thinned(beta, u)
+                by_map = shows_map(given, si, beta, u, hit.t)
+                beta = thinned(beta, u, si.bsdf.groups)
                 if not largest(beta) > _f4(0.0):
                     break
-                if si.bsdf.groups & STORED != 0:
+                if si.bsdf.groups & STORED != 0 and not by_map:
                     row = _replay(given, si, beta, samples, seed, rows, row, tally)
                 if si.bsdf.groups & FOLLOWED == 0:
                     break
-                ray, beta, _, u, splits, ways = split_camera_path(scene, eye, si, beta, seed, depth, splits, ways)
+                ray, beta, _, u, splits, ways = split_camera_path(scene, eye, si, beta, u, seed, depth, splits, ways)
                 if not largest(beta) > _f4(0.0):
                     break
             if ways.n == 0:

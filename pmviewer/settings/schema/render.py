@@ -64,8 +64,8 @@ class Render(Group):
     splits: int = setting(
         2,
         "Surfaces of smooth glass on a path from the camera at which it goes both ways, by reflection and by "
-        "refraction, the weaker thinned out beyond what it meets first; at all others it goes one of them by chance. "
-        "What is seen in glass is less noisy for it: lamps that a glass ball reflects most of all.",
+        "refraction, the weaker thinned out where it meets what stores photons; at all others it goes one of them by "
+        "chance. What is seen in glass is less noisy for it: lamps that a glass ball reflects most of all.",
         stage="image",
         scale="integer",
         unit="surfaces",
