@@ -105,7 +105,7 @@ def bucket_of(mask, level, cx, cy, cz):
 @device
 def cell_of(x, width):
     """The number along one axis of the cell that x lies in."""
-    return _i8(math.floor(x / width))
+    return _i8(np.floor(x / width))
 
 
 @kernel

@@ -53,7 +53,7 @@ def _texels_around(scene, light, d):
     z = dot(light_vector(scene, light, L_C), d)
     width, height = scene.sky_width, scene.sky_height
     turn = _f8(math.atan2(x, -z)) * _f8(0.5 / math.pi)
-    turn -= math.floor(turn)
+    turn -= np.floor(turn)
     place = turn * _f8(width) - _f8(0.5)
     if place < _f8(0.0):
         place += _f8(width)
@@ -146,7 +146,7 @@ def across_cell(u, a, b):
 @device
 def _around(turn):
     """sin and cos of so many turns, to the last digits of float32: by the angle to the nearest quarter."""
-    quarter = math.floor(_f8(4.0) * turn + _f8(0.5))
+    quarter = np.floor(_f8(4.0) * turn + _f8(0.5))
     rest = _f4((turn - _f8(0.25) * quarter) * _f8(2.0 * math.pi))
     sine, cosine = _f4(math.sin(rest)), _f4(math.cos(rest))
     if _i8(quarter) & 1 != 0:

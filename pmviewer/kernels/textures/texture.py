@@ -6,8 +6,6 @@ which has the same look-up in NumPy).
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from pmviewer.kernels.compile.jit import device
@@ -51,6 +49,8 @@ def _transformed(scene, texture, u, v):
 @device
 def _wrapped(k, size, wrap):
     """A texel number in 0 … size − 1."""
+    if 0 <= k < size:  # nearly all, without a division
+        return k
     if wrap == CLAMP:
         return max(np.int64(0), min(k, size - 1))
     if wrap == REPEAT:
@@ -81,7 +81,7 @@ def _corners(scene, texture, u, v):
         x -= _f4(0.5)
         y -= _f4(0.5)
         step = np.int64(1)
-    left, top = _f4(math.floor(x)), _f4(math.floor(y))
+    left, top = np.floor(x), np.floor(y)
     i0, j0 = _wrapped(np.int64(left), width, wrap), _wrapped(np.int64(top), height, wrap)
     i1, j1 = _wrapped(np.int64(left) + step, width, wrap), _wrapped(np.int64(top) + step, height, wrap)
     return (
@@ -108,7 +108,7 @@ def texture_rgb(scene, texture, u, v):
     first = load3(scene.textures, at + T_COLOR0)
     if np.int32(_number(scene, texture, T_KIND)) == CHECKERBOARD:
         half = _f4(0.5)
-        if (u - _f4(math.floor(u)) > half) == (v - _f4(math.floor(v)) > half):
+        if (u - np.floor(u) > half) == (v - np.floor(v) > half):
             return first
         return load3(scene.textures, at + T_COLOR1)
     a, b, c, d, s, t = _corners(scene, texture, u, v)

@@ -21,8 +21,6 @@ surfaces, mirrors and smooth glass it does), can't be a probability: such a phot
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from pmviewer.kernels.compile.jit import device
@@ -59,4 +57,4 @@ def copies(beta, u):
         return 0, _f4(0.0)
     if _f4(MOST_COPIES) < Y:
         return MOST_COPIES, _f4(1.0) / _f4(MOST_COPIES)
-    return min(math.floor(Y + u), MOST_COPIES), _f4(1.0) / Y
+    return min(np.int64(np.floor(Y + u)), MOST_COPIES), _f4(1.0) / Y

@@ -127,7 +127,7 @@ def _spread(rings, sectors, radius, phi, covered, what, buffer):
     inner, outer = max(radius - half, _f4(0.0)), min(radius + half, _f4(1.0))
     J0, J1 = _i8(inner * inner * _f4(rings) + _f4(0.5)), _i8(outer * outer * _f4(rings) + _f4(0.5))
     width = half / max(radius, half) * (_f4(sectors) / _TURN)
-    K0, K1 = _i8(math.floor(phi - width + _f4(0.5))), _i8(math.floor(phi + width + _f4(0.5)))
+    K0, K1 = _i8(np.floor(phi - width + _f4(0.5))), _i8(np.floor(phi + width + _f4(0.5)))
     for K in range(K0, min(K1, K0 + sectors)):
         at = rings * (K + sectors if K < 0 else (K - sectors if sectors <= K else K))
         for J in range(J0, min(J1, rings)):

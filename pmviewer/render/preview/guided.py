@@ -88,7 +88,7 @@ def upsample(small, small_guides, view, guides, shrink, out, first, last):
             nothing = n[0] == _f4(0.0) and n[1] == _f4(0.0) and n[2] == _f4(0.0)
             p = _place(view, _f4(X) + _f4(0.5), _f4(Y) + _f4(0.5), depth)
             fx, fy = (_f4(X) + _f4(0.5) - left) / s - _f4(0.5), (_f4(Y) + _f4(0.5) - top) / s - _f4(0.5)
-            x0, y0 = np.int64(math.floor(fx)), np.int64(math.floor(fy))
+            x0, y0 = np.int64(np.floor(fx)), np.int64(np.floor(fy))
             total = _f4(0.0)
             a0, a1, a2, a3, a4, a5 = _f4(0.0), _f4(0.0), _f4(0.0), _f4(0.0), _f4(0.0), _f4(0.0)
             for y in range(y0 - 1, y0 + 3):
@@ -139,7 +139,7 @@ def reproject(old, old_guides, old_view, view, guides, out, known, first, last):
             if not ahead > _f4(0.0) or not (abs(fx) < _f4(1e7) and abs(fy) < _f4(1e7)):
                 continue
             fx, fy = fx - _f4(0.5), fy - _f4(0.5)
-            x0, y0 = np.int64(math.floor(fx)), np.int64(math.floor(fy))
+            x0, y0 = np.int64(np.floor(fx)), np.int64(np.floor(fy))
             width = old_view[15] * ahead + old_view[16]
             total = _f4(0.0)
             a0, a1, a2 = _f4(0.0), _f4(0.0), _f4(0.0)
