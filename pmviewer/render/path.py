@@ -59,9 +59,10 @@ def term_of(eye, mirrored, stored, by_chain, in_medium):
 
 
 @device
-def path_survival(depth, beta):
-    """Probability with which a path goes on."""
-    return min(largest(beta), _f4(0.95)) if depth >= ROULETTE_DEPTH else _f4(1.0)
+def path_survival(depth, beta, compressed):
+    """Probability with which a path goes on: the share of the light that is left on its way. `compressed`, the
+    compression of all its lobes, is no loss: within glass radiance is n² times as high."""
+    return min(largest(beta) / compressed, _f4(0.95)) if depth >= ROULETTE_DEPTH else _f4(1.0)
 
 
 @kernel
@@ -73,6 +74,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
         seed, ray = sampled_ray(scene, eye, number)
         pixel = Pixel(number, seed, row_of(film, number), None, tally, None)
         beta, choice = WHITE, choose_by_power(lights, eye.light_samples)
+        compressed = _f4(1.0)
         stored = 0  # how often the path took lobes that photons are stored for
         mirrored = False  # whether it took a followed lobe before the first of these
         by_chain = False  # whether it took one right after the first of these
@@ -110,7 +112,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
                 tally[C_RAYS] += after.rays
                 tally[C_SHADOW_RAYS] += after.rays
                 deposit(pixel, term_of(eye, mirrored, stored, by_chain, in_medium), after.L)
-                survival = path_survival(depth, after.beta)
+                survival = path_survival(depth, after.beta, compressed)
                 if not u_end < survival:
                     break
                 origin, ray, pdf, beta = after.ray.o, after.ray, after.pdf, scale(after.beta, _f4(1.0) / survival)
@@ -154,10 +156,10 @@ def path_pass(scenes, eyes, film, counts, first, last):
                 tally[C_SHADOW_RAYS] += rays
                 deposit(pixel, term_of(eye, mirrored, stored, by_chain, in_medium), mul(beta, L))
             wi, beta, pdf, compression = scatter(scene, si, group, beta, u_lobe, u, v)
-            beta = scale(beta, compression)
+            beta, compressed = scale(beta, compression), compressed * compression
             if not largest(beta) > _f4(0.0):
                 break
-            survival = path_survival(depth, beta)
+            survival = path_survival(depth, beta, compressed)
             if not u_end < survival:
                 break
             beta = scale(beta, _f4(1.0) / survival)
