@@ -151,7 +151,7 @@ def _casting(record: NDArray[np.void]) -> Step:
 
 def _filter_steps(eye: NDArray[np.void], marks: NDArray[np.uint8]) -> list[Step]:
     weights, own = np.zeros((2, 1), np.float32), np.zeros((1, 1 + OWN_COLUMNS))
-    shared = weights, marks, own, np.zeros((1, 1)), (1, 1, False), -1, np.zeros(1), 0, 0
+    shared = weights, marks, own, np.zeros((1, 1)), (1, 1, False), -1, np.zeros(1), np.zeros((1, 1)), 0, 0
     return [Step("filter", weigh_samples, (eye, weights)), Step("filter", share_samples, shared)]
 
 

@@ -1,7 +1,8 @@
 """What pixels found in a pass is shared with those around them, by the filter (`pmviewer.render.filter`).
 
 All pixels are sampled at the same place within them, so that samples count the same in a pixel as in any other: a pass
-has one small table of weights, a row for each axis.
+has one small table of weights, a row for each axis. What a column of pixels has by the weights of rows is added up
+once, and serves all pixels of a row that look that far: 10 samples a pixel in place of 25 where the reach is 2.
 """
 
 from __future__ import annotations
@@ -55,37 +56,53 @@ def _share(weights, reach, x, y, width, height):
     return np.float64(1.0 / inside) if inside >= _f4(FEWEST) else np.float64(0.0)
 
 
+@device
+def _add_up_column(weights, own, x, y, width, height, columns, out):
+    """out: the samples of column x around row y, by the weights of rows, those outside of the picture missing."""
+    reach = (weights.shape[1] - 1) // 2
+    for c in range(columns):
+        out[c] = 0.0
+    for j in range(max(-reach, -y), min(reach, height - 1 - y) + 1):
+        w, there = np.float64(weights[1, reach + j]), (y + j) * width + x
+        if w != 0.0:
+            for c in range(TERMS_END):
+                out[c] += w * own[there, c]
+            for c in range(CHANNELS, columns):
+                out[c] += w * own[there, c]
+
+
 @kernel
-def share_samples(weights, marks, own, film, sizes, numbered, line, first, last):
+def share_samples(weights, marks, own, film, sizes, numbered, line, beside, first, last):
     """Add to the pixels first … last−1 of the film what the samples around them tell.
 
     weights: of `weigh_samples`; marks: uint8 (pixels,) or (0,), where OUTLINED pixels have emission of their own; own:
     float64 (pixels, columns + OWN_COLUMNS), each pixel's samples of the pass; film: float64 (pixels, columns) or, with
     the terms of each pixel's own samples behind them, (pixels, columns + terms); sizes: width and height of the
     picture, and whether the film's sums are replaced; numbered: the column that is no sum but a number of which the
-    highest counts, −1 for none; line: float64 as wide as the film, room for a pixel's sums. What properties of surfaces
-    the pixel sees is its own.
+    highest counts, −1 for none; line: float64 as wide as the film, room for a pixel's sums; beside: float64
+    (2·reach + 1, columns), room for those of columns of pixels. What properties of surfaces the pixel sees is its own.
     """
     width, height, anew = sizes
     columns = own.shape[1] - OWN_COLUMNS
     reach = (weights.shape[1] - 1) // 2
+    side, ready = 2 * reach + 1, 0  # columns before `ready` are added up, each at its place modulo `side`
     for pixel in range(first, last):
         y, x = pixel // width, pixel % width
-        for c in range(columns):
-            line[c] = own[pixel, c] if TERMS_END <= c < CHANNELS else 0.0
+        if pixel == first or x == 0:
+            ready = max(x - reach, 0)
+        while ready <= min(x + reach, width - 1):
+            _add_up_column(weights, own, ready, y, width, height, columns, beside[ready % side])
+            ready += 1
         share = _share(weights, reach, x, y, width, height)
-        for j in range(max(-reach, -y), min(reach, height - 1 - y) + 1):
-            for i in range(max(-reach, -x), min(reach, width - 1 - x) + 1):
-                w = np.float64(weights[1, reach + j] * weights[0, reach + i]) * share
-                if share == 0.0 and j == 0 and i == 0:
-                    w = 1.0
-                if w == 0.0:
-                    continue
-                there = pixel + j * width + i
+        for c in range(columns):
+            line[c] = own[pixel, c] if TERMS_END <= c < CHANNELS or share == 0.0 else 0.0
+        for i in range(max(-reach, -x), min(reach, width - 1 - x) + 1):
+            w, there = np.float64(weights[0, reach + i]) * share, (x + i) % side
+            if w != 0.0:
                 for c in range(TERMS_END):
-                    line[c] += w * own[there, c]
+                    line[c] += w * beside[there, c]
                 for c in range(CHANNELS, columns):
-                    line[c] += w * own[there, c]
+                    line[c] += w * beside[there, c]
         if numbered >= 0:
             line[numbered] = own[pixel, numbered]
         for c in range(columns, film.shape[1]):

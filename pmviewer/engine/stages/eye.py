@@ -85,9 +85,9 @@ def _share(film: Film, given: PassData, marks: NDArray[np.uint8], spans: Spans, 
     numbered = -1 if film.numbered is None else film.numbered
 
     def shared(parts: Sequence[tuple[int, int]]) -> None:
-        line = np.empty(film.sums.shape[1])
+        line, beside = np.empty(film.sums.shape[1]), np.empty((weights.shape[1], film.own_samples.shape[1]))
         for first, last in parts:
-            share_samples(weights, marks, film.own_samples, film.sums, sizes, numbered, line, first, last)
+            share_samples(weights, marks, film.own_samples, film.sums, sizes, numbered, line, beside, first, last)
             if film.moments is not None:
                 film.moments.add(film.sums, film.channels, first, last)
 
