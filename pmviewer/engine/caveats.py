@@ -23,6 +23,11 @@ CUT_PATHS = 1e-3
 CUT_OFF = 0.01
 """Share of the light that may still be on its way after the last scattering before a sentence says so."""
 
+SCARCE = 2e-4
+"""Share of a pass's trajectories that bring photons of caustics, below which each is a bright spot of its own: 4 of
+150,000 in a space ship under a lit dome of 30 times its size (file; relMSE after ten CPU s 2.1e-2, 3.7e-3 with guided
+emission), 150 and more in all other scenes with caustics that were tried."""
+
 
 def caveats(
     settings: Settings,
@@ -65,6 +70,7 @@ def caveats(
             f"None of {tally.emitted:,} photons arrived on a surface that shows it: do the lights shine past it?"
         )
     said += _too_few(settings, plan, tally, scene_radius, pixels)
+    said += _scarce(settings, plan, tally)
     return said
 
 
@@ -94,4 +100,15 @@ def _too_few(settings: Settings, plan: Plan, tally: Tally, scene_radius: float, 
     return [
         f"A look-up radius of {radius / scene_radius:.1e} of the scene finds one photon in some {seldom:.0e} look-ups: "
         "indirect light is missing rather than noisy. Widen estimate.radius or raise photons.N."
+    ]
+
+
+def _scarce(settings: Settings, plan: Plan, tally: Tally) -> list[str]:
+    """Caustics of so few photons that a picture shows them one by one; guided emission would send more."""
+    photons, N = tally.stored_in_pass.get("caustic", 0), settings.photons.N
+    if not plan.caustic_mask or plan.emission != "off" or not 0 < photons < SCARCE * N:
+        return []
+    return [
+        f"Only {photons:,} of {N:,} photons of a pass arrive over mirrors or glass, and each is a bright spot in the "
+        "picture: guide them there (importance.emission = Christensen keep, importance.map = average)."
     ]
