@@ -23,10 +23,13 @@ def _under_a_dome(radius):
     return replace(scene, shapes=(*scene.shapes, floor, dome), materials=(MIRROR, WHITE, black), lights=())
 
 
-@pytest.mark.parametrize("radius, emission, told", [(200, "off", True), (200, "guided", False), (8, "off", False)])
+CASES = [(200, "off", True), (200, "guided", False), (8, "off", False)]
+
+
+@pytest.mark.parametrize(("radius", "emission", "told"), CASES)
 def test_caustics_of_a_handful_of_photons_are_said(radius, emission, told):
-    """Of 200,000 photons 5 meet a ball in a dome 200 times as large, and some of these the floor; 3,100 one in a dome of
-    8. The sentence tells how many, and what it advises sends more of them."""
+    """Of 200,000 photons 5 meet a ball in a dome 200 times as large, and some of these the floor; 3,100 one in a dome
+    of 8. The sentence tells how many, and what it advises sends more of them."""
     guided = {"emission": "Christensen keep", "map": "average"} if emission == "guided" else {}
     settings = settings_of(photons={"N": 200_000}, estimate={"radius": 0.2 / radius}, importance=guided)
     renderer = rendered(_under_a_dome(radius), settings, 4)
@@ -36,7 +39,8 @@ def test_caustics_of_a_handful_of_photons_are_said(radius, emission, told):
     print(f"dome of {radius}, emission {emission}: {count} photons of caustics, {said}")
     assert bool(said) == told
     if told:
-        assert 0 < count <= 5 + 5 * np.sqrt(5) and f"Only {count} of 200,000 photons" in said[0]
+        assert 0 < count <= 5 + 5 * np.sqrt(5)
+        assert f"Only {count} of 200,000 photons" in said[0]
         assert "importance.emission = Christensen keep, importance.map = average" in said[0]
     else:
         assert count > 100
