@@ -11,6 +11,7 @@ from pmviewer.scene.description import Material, Parallelogram, Shape, Sphere
 from tests.support.scenes import MIRROR, ball_in_environment, rendered, settings_of
 
 WHITE = Material("white", "diffuse", (0.5, 0.5, 0.5), two_sided=True)
+CASES = [(200, "off", True), (200, "guided", False), (8, "off", False)]
 
 
 def _under_a_dome(radius):
@@ -21,9 +22,6 @@ def _under_a_dome(radius):
     dome = Shape("dome", Sphere((0, 0, 0), radius, True), 2, radiance=(1.0, 1.0, 1.0))
     black = replace(WHITE, name="black", reflectance=(0.0, 0.0, 0.0))
     return replace(scene, shapes=(*scene.shapes, floor, dome), materials=(MIRROR, WHITE, black), lights=())
-
-
-CASES = [(200, "off", True), (200, "guided", False), (8, "off", False)]
 
 
 @pytest.mark.parametrize(("radius", "emission", "told"), CASES)
