@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from collections.abc import Callable, Iterable
@@ -9,6 +10,8 @@ from dataclasses import replace
 
 from pmviewer.engine.frame import Frame, Level, Message, Preview, State, Status
 from pmviewer.engine.guarded import unexpected
+
+_NUMBER = re.compile(r"\d[\d.,]*(e[+-]?\d+)?")
 
 
 class Published:
@@ -23,6 +26,7 @@ class Published:
         self.status = Status()
         self._messages: list[Message] = []
         self._warned: set[str] = set()
+        self._warned_before: set[str] = set()
 
     def take_messages(self) -> list[Message]:
         """Messages since the last call."""
@@ -36,11 +40,16 @@ class Published:
             self._messages.append(Message(level, text, time.time()))
         self.notify()
 
-    def warn(self, warnings: Iterable[str]) -> None:
-        """Say those that were not said of the picture before."""
-        for warning in set(warnings) - self._warned:
-            self.say("warning", warning)
-        self._warned = set(warnings)
+    def warn(self, warnings: Iterable[str], anew: bool) -> None:
+        """Say those that were not said of the picture yet, nor of the one before; `anew` begins another picture. Other
+        numbers in the same sentence are nothing new."""
+        if anew:
+            self._warned_before, self._warned = self._warned, set()
+        for warning in warnings:
+            kind = _NUMBER.sub("", warning)
+            if kind not in self._warned | self._warned_before:
+                self.say("warning", warning)
+            self._warned.add(kind)
 
     def tell(self, state: State, text: str, passes: int = 0, progress: float | None = None) -> None:
         """What goes on now."""

@@ -436,7 +436,7 @@ class Session:
             draw = renderer.frame if renderer.passes else renderer.coarse_frame
             frame = draw(self._published.serial + 1, self._wanted(renderer))
             self._published.show(frame, self._version)
-            self._published.warn(frame.statistics.warnings)
+            self._published.warn(frame.statistics.warnings, anew=True)
         finally:
             with self._changed:
                 self._first_picture = False
@@ -468,6 +468,7 @@ class Session:
             with self._changed:
                 self._stepping = False
         frame = renderer.frame(self._published.serial + 1, self._wanted(renderer))
+        self._published.warn(frame.statistics.warnings, anew=False)
         self._previews.show(renderer, frame, self._settings, self._is_finished(), self._version)
         if self._ahead is not None:
             self._ahead.shown(renderer.scene, self._settings)
@@ -478,8 +479,7 @@ class Session:
 
     def _look(self, renderer: Renderer, wanted: Wanted) -> None:
         """Add to the newest frame what the display asks for. The first time its kernels are compiled."""
-        frame = self.frame
-        assert frame is not None
+        assert (frame := self.frame) is not None
         self._tell("rendering", "making what is shown")
         self._published.show(renderer.looked_at(frame, self._published.serial + 1, wanted), self._version)
         with self._changed:

@@ -474,3 +474,20 @@ def test_exposure_is_decided_once(tmp_path):
         assert len(seen) == 1
     finally:
         session.close()
+
+
+def test_what_passes_tell_is_said_once_and_of_the_next_picture_no_more(session):
+    """Albedo 1 in a closed box: that light is cut off shows in the first pass, after the first picture. Numbers of the
+    sentence may change from pass to pass."""
+
+    def cut_off():
+        return [m.text for m in session.take_messages() if m.level == "warning" and "still on its way" in m.text]
+
+    settings = settings_of(photons={"N": 500, "max_bounces": 8}, estimate={"radius": 0.1}, render={"passes": 4})
+    session.set(settings)
+    session.open(diffuse_box(albedo=1.0, size=8))
+    assert session.wait(timeout=PATIENCE)
+    assert len(cut_off()) == 1
+    session.set(with_values(settings, {"photons.max_bounces": 9}))
+    assert session.wait(timeout=PATIENCE)
+    assert cut_off() == []
