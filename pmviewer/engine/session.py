@@ -479,7 +479,8 @@ class Session:
 
     def _look(self, renderer: Renderer, wanted: Wanted) -> None:
         """Add to the newest frame what the display asks for. The first time its kernels are compiled."""
-        assert (frame := self.frame) is not None
+        frame = self.frame
+        assert frame is not None
         self._tell("rendering", "making what is shown")
         self._published.show(renderer.looked_at(frame, self._published.serial + 1, wanted), self._version)
         with self._changed:
@@ -493,8 +494,7 @@ class Session:
         """Report that the newest settings can't be rendered; the last frame stays, other settings may follow."""
         self._published.say("error", text)
         with self._changed:
-            self._renderer = None
-            self._failed_version = self._attempt
+            self._renderer, self._failed_version = None, self._attempt
             self._published.status = Status("failed", text)
             self._changed.notify_all()
         self._published.notify()
