@@ -123,7 +123,7 @@ def candidates(
         else:
             found.append(corners)
     if traits.n_lights < MANY_LIGHTS:
-        left_out.append(("importance", f"fewer than {MANY_LIGHTS} lights: their photons mostly reach what the camera sees"))
+        left_out.append(("importance", f"fewer than {MANY_LIGHTS} lights: photons mostly reach what is seen"))
     elif apart:
         left_out.append(("importance", "what it knows comes from the passes before, which may be rendered elsewhere"))
     elif seconds < GUIDED_FROM or traits.has_media:
