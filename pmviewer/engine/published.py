@@ -12,6 +12,7 @@ from pmviewer.engine.frame import Frame, Level, Message, Preview, State, Status
 from pmviewer.engine.guarded import unexpected
 
 _NUMBER = re.compile(r"\d[\d.,]*(e[+-]?\d+)?")
+"""What may differ between two sentences that say the same."""
 
 
 class Published:

@@ -74,7 +74,7 @@ def path_pass(scenes, eyes, film, counts, first, last):
         seed, ray = sampled_ray(scene, eye, number)
         pixel = Pixel(number, seed, row_of(film, number), None, tally, None)
         beta, choice = WHITE, choose_by_power(lights, eye.light_samples)
-        compressed = _f4(1.0)
+        compressed = _f4(1.0)  # the compression of all lobes that the path took
         stored = 0  # how often the path took lobes that photons are stored for
         mirrored = False  # whether it took a followed lobe before the first of these
         by_chain = False  # whether it took one right after the first of these

@@ -58,7 +58,11 @@ def _share(weights, reach, x, y, width, height):
 
 @device
 def _add_up_column(weights, own, x, y, width, height, columns, out):
-    """out: the samples of column x around row y, by the weights of rows, those outside of the picture missing."""
+    """out: the samples of column x around row y, by the weights of rows, those outside of the picture missing.
+
+    The loops over a sample's numbers stand here and in `share_samples`: as a function of their own they took 1.5 times
+    as long.
+    """
     reach = (weights.shape[1] - 1) // 2
     for c in range(columns):
         out[c] = 0.0

@@ -23,7 +23,8 @@ def test_white_ball_vanishes(ball, method):
     renderer = rendered(scene, settings_of(render={"method": method, "max_depth": 1000, "splits": 0}), passes=4)
     image = renderer.frame(1).image()
     print(f"{ball}, {method}: mean {image.mean():.6f}, extremes {image.min():.6f} {image.max():.6f}")
-    assert image.mean() == pytest.approx(1.0, abs=5e-3 if method == "path" else 1e-5)
+    caught = 4e-3 if ball == "glass mesh" else 0.0
+    assert image.mean() == pytest.approx(1.0, abs=1e-3 + caught if method == "path" else 1e-5)
     if method != "path":
         assert np.abs(image - 1).max() < 1e-4
     assert sum(renderer.tally.dropped.values()) == 0
