@@ -221,6 +221,11 @@ class Shape:
     emission: Texture | None = None
     media: tuple[int, int] | None = None
 
+    @property
+    def shines(self) -> bool:
+        """Is it a light?"""
+        return self.radiance is not None and max(self.radiance) > 0
+
 
 @dataclass(frozen=True, eq=False)
 class Group:

@@ -90,7 +90,7 @@ def _kind(shape: Shape) -> Any:
     """Shapes alike in this are alike for kernels."""
     g = shape.geometry
     given = (g.normals is None, g.uv is None, g.colours is None) if isinstance(g, Mesh) else ()
-    return type(g), given, shape.material, shape.radiance is not None and max(shape.radiance) > 0, type(shape.emission)
+    return type(g), given, shape.material, shape.shines, type(shape.emission)
 
 
 def _fewer(geometry: Any) -> Any:

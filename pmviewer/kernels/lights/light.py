@@ -430,6 +430,20 @@ def _emitter_of_others(scene):
 
 
 @device
+def light_start(scene, light, position):
+    """Where a photon leaves an area light, as by `light_point`, and its power of luminance 1, or nearly for a textured
+    one; of a point light there are the place and the power alone."""
+    L = light_vector(scene, light, L_RADIANCE)
+    if np.int32(light_number(scene, light, L_KIND)) == POINT:
+        up = (_f4(0.0), _f4(0.0), _f4(1.0))
+        return light_vector(scene, light, L_A), up, up, _f4(0.0), scale(L, _f4(1.0) / luminance(L))
+    u, v, density = spread(scene, light, position[0], position[1])
+    p, n, front, gap = light_point(scene, light, u, v)
+    beta = scale(radiance_from(scene, light, p, u, v), _f4(1.0) / (luminance(L) * density))
+    return p, n, front, gap, beta
+
+
+@device
 def _emit_plain(scene, light, position, direction):
     kind = np.int32(light_number(scene, light, L_KIND))
     L = light_vector(scene, light, L_RADIANCE)
@@ -439,9 +453,7 @@ def _emit_plain(scene, light, position, direction):
     if kind == ENVIRONMENT:
         d = square_to_sphere(direction[0], direction[1])
         return behind_scene(scene, d, position[0], position[1]), d, beta
-    u, v, density = spread(scene, light, position[0], position[1])
-    p, n, front, gap = light_point(scene, light, u, v)
-    beta = scale(radiance_from(scene, light, p, u, v), _f4(1.0) / (luminance(L) * density))
+    p, n, front, gap, beta = light_start(scene, light, position)
     local = square_to_cosine_hemisphere(direction[0], direction[1])
     d = from_basis(n, local[0], local[1], local[2])
     if dot(front, d) < _f4(0.0):

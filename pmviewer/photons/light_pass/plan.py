@@ -20,7 +20,8 @@ from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.settings.access import Photons
 
 LARGEST_SCALE = 2.0**12
-"""Most that indirect caustics count, in units of the caustic map: powers of stored photons end at 2¹⁷."""
+"""Most that indirect caustics count, in units of the caustic map, times what photons weigh that start beside what is
+small: powers of stored photons end at 2¹⁷."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,9 +29,9 @@ class PassPlan:
     """One light pass. For kernels: `record` (1,) of LIGHT_PASS_DTYPE, `emission` (2,) that says how photons start.
 
     Of its `traced` trajectories the first `filling` fill the global map, in `global_unit` watts a unit of power; the
-    first has the number `first_index` over all passes. `unit` watts of luminance are emitted; projection maps cover
-    `surface_power` of them for the first, `caustic_power` for the other trajectories, and direct caustics count
-    `direct_scale` in the caustic map. `most_stored`: photons that a trajectory stores at most; `media`: the first
+    first has the number `first_index` over all passes. `unit` watts of luminance are emitted; by projection maps the
+    first share `surface_power`, the others `caustic_power`, and the first start with `covered` of them; direct caustics
+    count `direct_scale` in the caustic map. `most_stored`: photons that a trajectory stores at most; `media`: the first
     trajectories also fill the volume map.
     """
 
@@ -43,6 +44,7 @@ class PassPlan:
     unit: float
     surface_power: float
     caustic_power: float
+    covered: float
     direct_scale: float
     most_stored: int
     projected: bool
@@ -75,8 +77,8 @@ class PassPlan:
         entries = ledgers[0, [E_EMITTED, E_ABSORBED, E_ESCAPED, E_TERMINATED, E_DROPPED]]
         if self.guided is not None:
             return np.asarray(entries * (self.unit / self.guided.N))
-        watts = entries * (self.surface_power / max(entries[0], 1.0))
-        return np.asarray(watts + (self.unit - self.surface_power) * np.array([1.0, 0.0, 1.0, 0.0, 0.0]))
+        watts = entries * (self.covered / max(entries[0], 1.0))
+        return np.asarray(watts + (self.unit - self.covered) * np.array([1.0, 0.0, 1.0, 0.0, 0.0]))
 
 
 def trajectories(settings: Photons, N: int, has_specular: bool) -> tuple[int, int, float]:
@@ -116,9 +118,10 @@ def plan_pass(
     """
     traced, filling, probability = trajectories(settings, N, has_specular)
     unit = scene.total_luminance
-    emission, surface_power, caustic_power = NO_PROJECTION, unit, unit
+    emission, surface_power, caustic_power, covered, gain = NO_PROJECTION, unit, unit, unit, 1.0
     if projection is not None:
         emission, surface_power, caustic_power = projection.records, projection.surface_power, projection.caustic_power
+        covered, gain = projection.covered, projection.gain
         if not caustic_power > 0:  # no light reaches what makes caustics
             traced = filling
     global_unit = surface_power / (filling * probability)
@@ -129,7 +132,7 @@ def plan_pass(
     density = filling / surface_power
     direct_density = density + ((traced - filling) / caustic_power if traced > filling else 0.0)
     indirect_scale = direct_density / density if projection is not None else 1.0
-    direct_scale = min(1.0, LARGEST_SCALE / indirect_scale)
+    direct_scale = min(1.0, LARGEST_SCALE / (indirect_scale * gain))
     record = pass_record(settings, seed, first_index, filling, has_specular, scene.has_media)
     record["store_probability"] = probability
     record["only_direct"] = projection is not None or not settings.indirect_caustics
@@ -145,6 +148,7 @@ def plan_pass(
         unit=unit,
         surface_power=surface_power,
         caustic_power=caustic_power,
+        covered=covered,
         direct_scale=direct_scale,
         most_stored=most_bounces(settings, scene.has_media)
         * (MOST_COPIES if settings.roulette == "equal" else 1)

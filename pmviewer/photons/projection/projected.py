@@ -14,9 +14,14 @@ PLACES      directional lights                   cells of the disc that photons 
 WORLD       spheres, cylinders, meshes           cells of directions in the world; a photon is kept with the
                                                  cosine to the light's normal as probability, c = 4·(share on)
 DISC        environments                         the disc, to one around what is to be met
-SCALES      environments, directional lights     nothing, c = 1; photons start more densely near what is
-                                                 small on a wide floor (`pmviewer.photons.projection.scales`)
+SCALES      environments, directional lights     nothing; photons start more densely near what is small on a
+                                                 wide floor (`pmviewer.photons.projection.scales`)
+CONES       points, all with a surface           the same by their directions
+                                                 (`pmviewer.photons.projection.cones`)
 ==========  ===================================  ==========================================================
+
+With SCALES and CONES c is 1 over how many times as densely photons start for what is small, and a photon's power has a
+factor 1/c beside its own: those that aim there have the power of all others, whatever is wasted elsewhere.
 """
 
 from __future__ import annotations
@@ -40,9 +45,10 @@ from pmviewer.kernels.warp import square_to_disk, square_to_sphere
 from pmviewer.maps.variant import ABSENT
 from pmviewer.photons.emission.scattered import emit_scattered
 from pmviewer.photons.emission.stratified import emit_stratified
+from pmviewer.photons.projection.cones import start_in_cones
 from pmviewer.photons.projection.scales import start_at_scales
 
-WHOLE, DIRECTIONS, PLACES, WORLD, DISC, SCALES = range(6)
+WHOLE, DIRECTIONS, PLACES, WORLD, DISC, SCALES, CONES = range(7)
 ROWS, COLUMNS = 64, 64
 
 NO_PROJECTION = np.repeat(ABSENT, 2)
@@ -53,6 +59,7 @@ PROJECTION_DTYPE = np.dtype(
         ("cdf", "i8"),  # float32 (n_lights + 1): distribution over covered power
         ("modes", "i8"),  # int32 (n_lights)
         ("first", "i8"),  # int32 (n_lights + 1): each light's cells
+        ("gains", "i8"),  # float32 (n_lights): 1/c of SCALES and CONES, 1 of others
         ("cells", "i8"),  # int32: row · COLUMNS + column of the cells that are on
         ("center_x", "f4"),  # of a sphere around everything to be met
         ("center_y", "f4"),
@@ -145,11 +152,14 @@ def emission(scene, projection, i, sequence, seed, index, u_pick, position, dire
         mode = load_i4(projection.modes, light)
         first = _i8(load_i4(projection.first, light))
         count = _i8(load_i4(projection.first, light + 1)) - first
+        if mode == CONES:
+            p, d, beta, factor = start_in_cones(scene, projection, light, position, direction)
+            return p, d, beta, light, factor > _f4(0.0), factor * load_f4(projection.gains, light)
         if mode in (WHOLE, DISC, SCALES):
             p, d, beta = emit_from(scene, light, position, direction)
             if mode == SCALES:
                 p, factor = start_at_scales(scene, projection, d, position)
-                return p, d, beta, light, factor > _f4(0.0), factor
+                return p, d, beta, light, factor > _f4(0.0), factor * load_f4(projection.gains, light)
             if mode == DISC:
                 p = _on_disc(scene, projection, d, position)
             return p, d, beta, light, True, _f4(1.0)

@@ -1,9 +1,10 @@
-"""What is small on a wide floor: a house in a landscape, a ball on a plane (T7).
+"""What is small on a wide floor, or before a backdrop: a house in a landscape, a ship on a stage (T7).
 
-Light from outside arrives over a disc as wide as the whole scene. Where a floor reaches far beyond everything that
-stands on it, hardly a photon meets anything else. Such a floor is what is left out here: surfaces that are wider than
-WIDE of the scene, all of them level with one another. Walls of a room are not, and a landscape of many small triangles
-is not told from what stands in it: then there is nothing to be told apart.
+Light from outside arrives over a disc as wide as the whole scene, that of a dome over all that is below it. Where a
+floor reaches far beyond everything that stands on it, hardly a photon meets anything else. Such a floor is what is left
+out here: surfaces wider than WIDE of what there is, none of which face each other. So do the walls of a room; and a
+landscape of many small triangles is not told from what stands in it: then there is nothing to be told apart. In what
+stands there is looked again in the same way. Lights are neither floors nor what is to be met.
 """
 
 from __future__ import annotations
@@ -20,11 +21,15 @@ from pmviewer.scene.description import Disk, Geometry, Mesh, Parallelogram, Scen
 Float = NDArray[np.float64]
 
 WIDE = 0.25
-"""Of the scene's box, corner to corner: a surface of that width is a floor."""
-LEVEL = 0.99
-"""Least cosine between the normals of floors."""
+"""Of a box around all, corner to corner: a surface of that width is a floor."""
+FACING = -0.2
+"""Cosine between the directions to two floors below which they face each other."""
+NARROW = 0.02
+"""Height of a triangle over its longest edge, below which it is no floor."""
+ROUND = 4.0
+"""Least radius of a sphere that is a floor, relative to that of what stands there."""
 SMALL = 0.5
-"""Most radius of what stands there, relative to the scene's."""
+"""Most radius of what stands there, relative to that of all."""
 
 
 class Small(NamedTuple):
@@ -34,25 +39,47 @@ class Small(NamedTuple):
     radius: float
 
 
+class _Sheets(NamedTuple):
+    """Wide surfaces that are flat: points (n, 3) of them and unit normals (n, 3)."""
+
+    points: Float
+    normals: Float
+
+
 def small_of(scene: Scene, radius: float) -> Small | None:
     """What stands on a scene's floor, the scene having that bounding sphere; None where it has no floor, or that
     reaches little farther."""
+    triangles: dict[int, Float] = {}
+    found = None
+    while (smaller := _without_floor(scene, radius, triangles)) is not None:
+        found, radius = smaller, smaller.radius
+    return found
+
+
+def _without_floor(scene: Scene, radius: float, triangles: dict[int, Float]) -> Small | None:
+    """What is left without surfaces that are wide within that radius. `triangles`: corners (n, 3, 3) of meshes that
+    have been looked at, by their objects' numbers."""
     wide = 2 * WIDE * radius
-    lows, highs, normals, grounds = [], [], [], []
+    lows, highs, sheets, balls = [], [], [], []
     for shape in scene.shapes:
+        if shape.shines:
+            continue
         low, high = (np.array(corner, float)[None] for corner in shape_bounds(shape))
         if np.linalg.norm(high - low) > wide:
             low = high = np.zeros((0, 3))
             if isinstance(shape.geometry, Mesh):
-                corners = shape.geometry.vertices[shape.geometry.faces].astype(float)
+                mesh = shape.geometry
+                if id(mesh) not in triangles:
+                    triangles[id(mesh)] = mesh.vertices[mesh.faces].astype(float)
+                corners = triangles[id(mesh)]
                 low, high = corners.min(axis=1), corners.max(axis=1)
                 large = np.linalg.norm(high - low, axis=1) > wide
-                normals.append(_normals_of(corners[large]))
+                sheets.append(_sheets_of(corners[large]))
                 low, high = low[~large], high[~large]
             elif isinstance(shape.geometry, Sphere):
-                grounds.append(np.array(shape.geometry.center, float))
-            elif (normal := _normal_of(shape.geometry)) is not None:
-                normals.append(normal)
+                balls.append(shape.geometry)
+            elif (sheet := _sheet_of(shape.geometry)) is not None:
+                sheets.append(sheet)
             else:
                 return None
         lows.append(low)
@@ -61,26 +88,46 @@ def small_of(scene: Scene, radius: float) -> Small | None:
         low, high = (np.array(corner, float)[None] for corner in instance_bounds(scene.instances))
         lows.append(low)
         highs.append(high)
-    low, high, every = np.concatenate(lows), np.concatenate(highs), np.concatenate([*normals, np.zeros((0, 3))])
-    if not len(low) or not (len(every) or grounds):
+    low, high = (np.concatenate([*corners, np.zeros((0, 3))]) for corners in (lows, highs))
+    if not len(low) or not (balls or any(len(sheet.points) for sheet in sheets)):
         return None
     low, high = low.min(axis=0), high.max(axis=0)
     center, around = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
-    every = np.concatenate([every, *((center - ground)[None] for ground in grounds)])
-    every = every / np.maximum(np.linalg.norm(every, axis=1, keepdims=True), 1e-300)
-    if not 0 < around <= SMALL * radius or not np.all(np.abs(every @ every[0]) >= LEVEL):
+    if not 0 < around <= SMALL * radius or any(ball.radius < ROUND * around for ball in balls):
         return None
-    return Small(center, around)
+    return None if _face_each_other(sheets, balls, center) else Small(center, around)
 
 
-def _normals_of(corners: Float) -> Float:
-    """Of triangles (n, 3, 3), of any length; those without area have none."""
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return normals[np.linalg.norm(normals, axis=1) > 0]
+def _face_each_other(sheets: list[_Sheets], balls: list[Sphere], center: Float) -> bool:
+    """Do two of them lie on opposite sides of what stands there, or does one go around it?"""
+    toward = []
+    for points, normals in sheets:
+        side = np.einsum("ij,ij->i", points - center, normals)
+        toward.append(normals * np.where(side < 0, -1.0, 1.0)[:, None])
+    for ball in balls:
+        away = np.subtract(ball.center, center)
+        distance = float(np.linalg.norm(away))
+        if distance <= ball.radius:
+            return True
+        toward.append(away[None] / distance)
+    out = np.unique(np.round(np.concatenate(toward), 2), axis=0)
+    return bool((out @ out.T).min() < FACING)
 
 
-def _normal_of(geometry: Geometry) -> Float | None:
-    """(1, 3) of a flat surface, of any length."""
+def _sheets_of(corners: Float) -> _Sheets:
+    """Of triangles (n, 3, 3); narrow ones, such as the sides of a slab, are none."""
+    edges = corners - np.roll(corners, 1, axis=1)
+    normals = np.cross(edges[:, 1], edges[:, 2])
+    areas = np.linalg.norm(normals, axis=1)
+    sheet = areas > NARROW * (edges**2).sum(axis=2).max(axis=1)
+    return _Sheets(corners[sheet, 0], normals[sheet] / areas[sheet, None])
+
+
+def _sheet_of(geometry: Geometry) -> _Sheets | None:
+    """Of another surface that may be a floor, which is a flat one."""
     if isinstance(geometry, Parallelogram):
-        return np.cross(geometry.edge_u, geometry.edge_v)[None]
-    return np.array(geometry.normal, float)[None] if isinstance(geometry, Disk) else None
+        corner = np.array(geometry.corner, float)
+        return _sheets_of(np.stack([corner, corner + geometry.edge_u, corner + geometry.edge_v])[None])
+    if isinstance(geometry, Disk):
+        return _Sheets(np.array(geometry.center, float)[None], np.array(geometry.normal, float)[None])
+    return None

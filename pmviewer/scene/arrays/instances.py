@@ -55,7 +55,7 @@ def normalised(group: Group, scene: Scene) -> Normal:
     """The group in the unit ball around the origin. Raises SceneError for an empty group or one with a light."""
     if not group.shapes:
         raise SceneError(f"The group '{group.name}' has no surface.", scene.path, hint="Add a shape, or remove it.")
-    light = next((s for s in group.shapes if s.radiance is not None and max(s.radiance) > 0), None)
+    light = next((s for s in group.shapes if s.shines), None)
     if light is not None:
         what = f"'{light.name}' in the group '{group.name}' is a light, which can't be instanced."
         raise SceneError(what, scene.path, hint="Move the light out of the group.")

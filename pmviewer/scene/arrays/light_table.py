@@ -40,10 +40,6 @@ BRIGHTEST = 1e32
 """Radiance or intensity, a factor of a million from the end of float32: squares of small distances divide it."""
 
 
-def _shines(shape: Shape) -> bool:
-    return shape.radiance is not None and any(c > 0 for c in shape.radiance)
-
-
 def _areas(corners: Float) -> NDArray[np.float64]:
     """Of triangles (n, 3, 3)."""
     corners64 = corners.astype(float)
@@ -77,7 +73,7 @@ class LightTable:
         listed = 0
         shape_of_triangle = shape_of_prim[: len(vertices)]  # in ascending order
         ends = np.searchsorted(shape_of_triangle, np.arange(len(scene.shapes) + 1, dtype=shape_of_prim.dtype))
-        shine = np.array([_shines(shape) for shape in scene.shapes], bool)
+        shine = np.array([shape.shines for shape in scene.shapes], bool)
         areas = np.zeros(len(vertices))
         if shine.any():
             lit = np.flatnonzero(np.repeat(shine, np.diff(ends)))

@@ -106,7 +106,8 @@ def _albedo(scene: Scene, shape: Shape, corners: int) -> Float:
     tint: Float = np.ones(3)
     if material.vertex_colours and isinstance(shape.geometry, Mesh) and shape.geometry.colours is not None:
         tint = shape.geometry.colours[shape.geometry.faces].reshape(-1, 3)
-    if shape.radiance is not None and max(shape.radiance) > 0:
+    if shape.shines:
+        assert shape.radiance is not None
         colour, tint = np.array(shape.radiance) / max(shape.radiance), np.ones(3)
     return np.broadcast_to(colour * tint, (corners, 3))
 

@@ -48,18 +48,13 @@ class Catalogue:
 
 def catalogue_of(scene: Scene) -> Catalogue:
     """What of the scene can be edited."""
-    glowing = [(s.name, "shape", i) for i, s in enumerate(scene.shapes) if is_light(s)]
+    glowing = [(s.name, "shape", i) for i, s in enumerate(scene.shapes) if s.shines]
     other = [(light.name, "light", i) for i, light in enumerate(scene.lights)]
     shapes = [(s.name, "shape", i) for i, s in enumerate(scene.shapes)]
     instances = [(instance.name, "instance", i) for i, instance in enumerate(scene.instances)]
     materials = [(m.name, "material", i) for i, m in enumerate(scene.materials)]
     kinds = {"light": glowing + other, "material": materials, "object": shapes + instances}
     return Catalogue({kind: _targets(kind, entries) for kind, entries in kinds.items()})
-
-
-def is_light(shape: Shape) -> bool:
-    """Does the surface emit?"""
-    return shape.radiance is not None and max(shape.radiance) > 0
 
 
 def refusal(scene: Scene, target: Target, prop: str) -> str | None:

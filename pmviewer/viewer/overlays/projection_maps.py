@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 DIRECTIONS = ("directions", "world directions")
 PLACES = ("places",)
-SCALES = "scales"
 _CORNERS = np.array([(0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)])
 
 
@@ -83,7 +82,7 @@ class ProjectionMaps(Overlay):
         shown = [(number, cells) for number, cells in enumerate(maps) if is_drawn(cells)]
         self._lights = tuple((number, cells.light, cells.share) for number, cells in shown)
         self._other_lights = len(maps) - len(shown)
-        self._denser = sum(cells.mode == SCALES for cells in maps)
+        self._denser = sum(cells.denser for cells in maps)
         if shown:
             vertices = [cell_vertices(cells, radius, light_colour(number)) for number, cells in shown]
             self._buffer = self.shaders.context.buffer(np.concatenate(vertices))
