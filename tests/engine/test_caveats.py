@@ -11,7 +11,7 @@ from pmviewer.scene.description import Material, Parallelogram, Shape, Sphere
 from tests.support.scenes import MIRROR, ball_in_environment, rendered, settings_of
 
 WHITE = Material("white", "diffuse", (0.5, 0.5, 0.5), two_sided=True)
-CASES = [(200, "off", True), (200, "guided", False), (8, "off", False)]
+CASES = [(200, "off", True), (200, "guided", False), (200, "aimed", False), (8, "off", False)]
 
 
 def _under_a_dome(radius):
@@ -27,9 +27,13 @@ def _under_a_dome(radius):
 @pytest.mark.parametrize(("radius", "emission", "told"), CASES)
 def test_caustics_of_a_handful_of_photons_are_said(radius, emission, told):
     """Of 200,000 photons 5 meet a ball in a dome 200 times as large, and some of these the floor; 3,100 one in a dome
-    of 8. The sentence tells how many, and what it advises sends more of them."""
+    of 8. The sentence tells how many, and what it advises sends more of them, as does the aim of photons at what is
+    small."""
     guided = {"emission": "Christensen keep", "map": "average"} if emission == "guided" else {}
-    settings = settings_of(photons={"N": 200_000}, estimate={"radius": 0.2 / radius}, importance=guided)
+    projection = "auto" if emission == "aimed" else "off"
+    settings = settings_of(
+        photons={"N": 200_000, "projection": projection}, estimate={"radius": 0.2 / radius}, importance=guided
+    )
     renderer = rendered(_under_a_dome(radius), settings, 4)
     statistics = renderer.frame(1).statistics
     said = [sentence for sentence in statistics.warnings if "bright spot" in sentence]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.lights.light import light_start
-from pmviewer.kernels.scene import L_A, L_KIND, POINT, light_number, light_vector
+from pmviewer.kernels.scene import L_KIND, POINT, light_number
 from pmviewer.kernels.surface import leave
 from pmviewer.kernels.vector import dot, from_basis, scale, sub
 from pmviewer.kernels.warp import square_to_cone, square_to_cosine_hemisphere, square_to_sphere

@@ -3,8 +3,9 @@
 Light from outside arrives over a disc as wide as the whole scene, that of a dome over all that is below it. Where a
 floor reaches far beyond everything that stands on it, hardly a photon meets anything else. Such a floor is what is left
 out here: surfaces wider than WIDE of what there is, none of which face each other. So do the walls of a room; and a
-landscape of many small triangles is not told from what stands in it: then there is nothing to be told apart. In what
-stands there is looked again in the same way. Lights are neither floors nor what is to be met.
+landscape of many small triangles is not told from what stands in it: then there is nothing to be told apart. What
+stands there is looked at again in the same way. Lights are neither floors nor what is to be met: a dome holds what it
+lights.
 """
 
 from __future__ import annotations
@@ -47,8 +48,8 @@ class _Sheets(NamedTuple):
 
 
 def small_of(scene: Scene, radius: float) -> Small | None:
-    """What stands on a scene's floor, the scene having that bounding sphere; None where it has no floor, or that
-    reaches little farther."""
+    """What stands on a scene's floor or under a dome, the scene having that bounding sphere; None where neither reaches
+    much farther."""
     triangles: dict[int, Float] = {}
     found = None
     while (smaller := _without_floor(scene, radius, triangles)) is not None:
@@ -89,7 +90,7 @@ def _without_floor(scene: Scene, radius: float, triangles: dict[int, Float]) -> 
         lows.append(low)
         highs.append(high)
     low, high = (np.concatenate([*corners, np.zeros((0, 3))]) for corners in (lows, highs))
-    if not len(low) or not (balls or any(len(sheet.points) for sheet in sheets)):
+    if not len(low):
         return None
     low, high = low.min(axis=0), high.max(axis=0)
     center, around = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
@@ -110,8 +111,8 @@ def _face_each_other(sheets: list[_Sheets], balls: list[Sphere], center: Float) 
         if distance <= ball.radius:
             return True
         toward.append(away[None] / distance)
-    out = np.unique(np.round(np.concatenate(toward), 2), axis=0)
-    return bool((out @ out.T).min() < FACING)
+    out = np.unique(np.round(np.concatenate([*toward, np.zeros((0, 3))]), 2), axis=0)
+    return bool((out @ out.T).min(initial=1.0) < FACING)
 
 
 def _sheets_of(corners: Float) -> _Sheets:

@@ -28,7 +28,6 @@ from pmviewer.scene.description import (
     PointLight,
     ProjectorLight,
     Scene,
-    Shape,
     Sphere,
     SpotLight,
 )

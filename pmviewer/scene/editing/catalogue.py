@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pmviewer.errors import SceneError
-from pmviewer.scene.description import Environment, Light, Material, Scene, Shape
+from pmviewer.scene.description import Environment, Light, Material, Scene
 
 MOST_LISTED = 8
 """Names that a sentence lists."""

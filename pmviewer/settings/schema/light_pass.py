@@ -115,7 +115,7 @@ class Photons(Group):
         "auto",
         "Projection maps: photons start only where they can meet a surface, and those for the caustic map alone (q "
         "below 1) only where they can meet mirrors or glass. auto: where that spares at least a third of them. Light "
-        "from outside starts more densely near what stands on a wide floor.",
+        "from outside starts more densely near what stands on a wide floor; so does that of lamps high above it.",
         stage="photons",
         scale="choice",
         title="projection maps",

@@ -69,7 +69,7 @@ class ProjectionMaps(Overlay):
         self._lights: tuple[tuple[int, str, float], ...] = ()
         """Number, name and share of the power that is covered, of the lights that are drawn."""
         self._other_lights, self._denser = 0, 0
-        """Lights without cells; of these, those whose photons start more densely near what stands on a wide floor."""
+        """Lights without cells; of these, those whose photons start more densely for what stands on a wide floor."""
 
     def needs(self, source: Source) -> Needs | None:
         style: ProjectionOverlay = self.style(source.settings)
@@ -110,6 +110,6 @@ class ProjectionMaps(Overlay):
             imgui.text_disabled(f"and {len(self._lights) - MOST_SWATCHES} more")
         if self._other_lights:
             said = f"Lights without cells: {grouped(self._other_lights)}. Their photons start anywhere"
-            wrapped(said + (", more of them near what stands on the floor." if self._denser else "."))
+            wrapped(said + (", more of them for what stands on the floor." if self._denser else "."))
         elif not self._lights:
             wrapped("No maps: they would spare too little here (photons.projection = on makes them).")
