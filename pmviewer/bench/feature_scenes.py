@@ -89,6 +89,11 @@ MATERIALS: Mapping[str, str] = {
         + _picture("roughness.png", raw=True, slot='name="alpha"')
         + "</bsdf>"
     ),
+    "roughness texture, along alone": _twosided(
+        '<bsdf type="roughconductor"><string name="distribution" value="ggx"/>'
+        + _picture("roughness.png", raw=True, slot='name="alpha_u"')
+        + '<float name="alpha_v" value="0.05"/></bsdf>'
+    ),
 }
 """Material by the row's name."""
 

@@ -187,6 +187,8 @@ M_THIN = _columns[42]
 THIN_EXACT, THIN_IGNORED, THIN_TINTED, THIN_REFLECTING, THIN_BY_SETTING = range(5)
 """What M_THIN may be, see `pmviewer.kernels.bsdf.thin_glass`."""
 M_METALLIC_MAP, M_WEIGHT_MAP = _columns[40:42]
+M_ACROSS_MAP = M_METALLIC_MAP
+"""Of other than principled materials: texture of the roughness across the tangent, M_ALPHA_MAP being that along it."""
 M_GLASS = _columns[43]
 """Row of `glasses`, 0 where the index is the same for all wavelengths. Then M_ETA_RGB are the channels' mean indices.
 """

@@ -221,6 +221,16 @@ def test_roughness_is_textured_and_keeps_its_ratio():
     assert brushed["alpha"] == pytest.approx(np.tile([0.15, 0.6], (len(brushed["alpha"]), 1)), rel=1e-5)
 
 
+def test_roughness_along_and_across_have_textures_of_their_own():
+    plate, uv = SHAPES["rectangle"]
+    along, across = Bitmap(GREYS), Checkerboard((0.2,) * 3, (0.7,) * 3)
+    both = {"alpha": along, "alpha_across": across}
+    found = look(textured(plate, kind="rough conductor", alpha=(0.1, 0.4), textures=both), *rays(400))
+    expected = np.stack([evaluate(texture, uv(found["p"])) @ LUMINANCE for texture in both.values()], 1)
+    assert np.mean(np.abs(found["alpha"] - expected).max(axis=1) < 1e-3) > 0.98  # edges of fields are sharp
+    assert np.ptp(found["alpha"], axis=0).min() > 0.4
+
+
 @pytest.mark.parametrize("name", ["sphere", "sphere inside", "cylinder", "rectangle", "swapped", "mesh"])
 def test_bump_is_the_displaced_surfaces_normal(name):
     """The normal of p + h(u, v)·n, by differences over the surface, for a small h: exact to first order in h's size."""

@@ -5,8 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pmviewer.scene.arrays.material_lobes import glossy_roughness
 from pmviewer.scene.description import ConstantEnvironment, Material, PointLight
 from pmviewer.scene.optics import METALS, metal
+from pmviewer.scene.texture import Checkerboard
 from tests.scene.helpers import load
 
 
@@ -129,6 +131,25 @@ def test_roughness_and_distribution(tmp_path: Path) -> None:
         assert (found.alpha, found.distribution) == (taken, "beckmann")
         assert len(warnings) == 1
         assert message in warnings[0]
+
+
+def test_roughness_along_and_across(tmp_path: Path) -> None:
+    """Each a texture or a number; the picture of one is not used for the other."""
+    picture = '<texture name="{}" type="checkerboard"><float name="color0" value="{}"/></texture>'
+    for odd, alpha, along, across in (
+        (picture.format("alpha_u", 0.6) + '<float name="alpha_v" value="0.3"/>', (0.4, 0.3), (0.6, 0.2), (0.3, 0.3)),
+        ('<float name="alpha_u" value="0.3"/>' + picture.format("alpha_v", 0.6), (0.3, 0.4), (0.3, 0.3), (0.6, 0.2)),
+        (picture.format("alpha_u", 0.8) + picture.format("alpha_v", 0.6), (0.5, 0.4), (0.8, 0.2), (0.6, 0.2)),
+    ):
+        found, warnings = material(tmp_path, f'<bsdf type="roughconductor">{odd}</bsdf>')
+        assert (found.alpha, warnings) == (pytest.approx(alpha), ())
+        for slot, fields in (("alpha", along), ("alpha_across", across)):
+            texture = found.textures[slot]
+            assert isinstance(texture, Checkerboard)
+            assert (texture.color0[0], texture.color1[0]) == pytest.approx(fields)
+        assert glossy_roughness(found) == pytest.approx((min(*along, *across), min(max(along), max(across))))
+    found, _ = material(tmp_path, f'<bsdf type="roughconductor">{picture.format("alpha_u", 0.6)}</bsdf>')
+    assert found.textures.keys() == {"alpha"}
 
 
 def test_a_metal_in_another_medium(tmp_path: Path) -> None:

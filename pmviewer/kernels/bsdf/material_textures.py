@@ -7,12 +7,14 @@ import math
 import numpy as np
 
 from pmviewer.kernels.accel.instance import stored_prim
+from pmviewer.kernels.bsdf.kinds import PRINCIPLED
 from pmviewer.kernels.bsdf.material import MaterialParams, material_params
 from pmviewer.kernels.bsdf.microfacet import SMOOTHEST
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.memory import load_f4
 from pmviewer.kernels.scene import (
+    M_ACROSS_MAP,
     M_ALPHA_MAP,
     M_COLOURED,
     M_REFLECTANCE_MAP,
@@ -65,7 +67,8 @@ def tinted(scene, material, prim, b1, b2, reflectance):
 def texture_params(scene, material, prim, b1, b2, p):
     """The material's numbers at the point p of primitive `prim` with a triangle's barycentric coordinates (b1, b2).
 
-    A texture of roughness keeps the ratio of the two directions, and the material's tables are those of its mean.
+    A texture of roughness keeps the ratio of the two directions unless each has its own, and the material's tables are
+    those of its mean.
     """
     plain = material_params(scene, material)
     row = material * MATERIAL_COLUMNS
@@ -89,8 +92,12 @@ def texture_params(scene, material, prim, b1, b2, p):
         transmittance = texture_rgb(scene, transmittance_map, u, v)
     if alpha_map >= 0:
         value = texture_value(scene, alpha_map, u, v)
-        middle = _f4(math.sqrt(ax * ay))
-        ax, ay = max(SMOOTHEST, value * (ax / middle)), max(SMOOTHEST, value * (ay / middle))
+        across_map = np.int64(-1) if plain.kind == PRINCIPLED else np.int64(load_f4(m, row + M_ACROSS_MAP))
+        if across_map >= 0:
+            ax, ay = max(SMOOTHEST, value), max(SMOOTHEST, texture_value(scene, across_map, u, v))
+        else:
+            middle = _f4(math.sqrt(ax * ay))
+            ax, ay = max(SMOOTHEST, value * (ax / middle)), max(SMOOTHEST, value * (ay / middle))
     return MaterialParams(
         plain.kind,
         plain.two_sided,

@@ -21,6 +21,7 @@ _COLUMN = {
     "reflectance": K.M_REFLECTANCE_MAP,
     "specular_reflectance": K.M_SPECULAR_MAP,
     "alpha": K.M_ALPHA_MAP,
+    "alpha_across": K.M_ACROSS_MAP,
     "transmittance": K.M_TRANSMITTANCE_MAP,
     "normal": K.M_NORMAL_MAP,
     "bump": K.M_BUMP_MAP,

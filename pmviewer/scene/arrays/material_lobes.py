@@ -83,6 +83,10 @@ def glossy_roughness(material: Material) -> tuple[float, ...]:
 def _specular_roughness(material: Material, least: float) -> tuple[float, ...]:
     if "alpha" not in material.textures:
         return (max(min(material.alpha), least),)
+    if "alpha_across" in material.textures:
+        both = [_extremes(material.textures[slot]) for slot in ("alpha", "alpha_across")]
+        low, high = (max(least, min(values)) for values in zip(*both, strict=True))
+        return (low,) if low == high else (low, high)
     # Textured roughness keeps the ratio of both directions.
     narrow = max(min(material.alpha), float(SMOOTHEST))
     middle = math.sqrt(narrow * max(*material.alpha, float(SMOOTHEST)))

@@ -8,10 +8,10 @@ from pmviewer.scene.description import Material
 from pmviewer.scene.formats.mitsuba.compound import leaves, on_parts
 from pmviewer.scene.formats.mitsuba.document import Properties
 from pmviewer.scene.formats.mitsuba.texture import has_vertex_colours
-from pmviewer.scene.texture import Texture, scaled
+from pmviewer.scene.texture import Checkerboard, Texture, scaled
 
 _TRANSMITTANCES = ("specular_transmittance", "diffuse_transmittance", "transmittance")
-_ALPHAS = ("alpha", "alpha_u", "alpha_v")
+_ALPHAS = ("alpha_u", "alpha_v")
 
 
 def _slots(material: Material) -> dict[str, str]:
@@ -23,7 +23,7 @@ def _slots(material: Material) -> dict[str, str]:
         "diffuse_reflectance": "reflectance",
         "specular_reflectance": specular,
         **dict.fromkeys(_TRANSMITTANCES, "transmittance"),
-        **dict.fromkeys(_ALPHAS, "alpha"),
+        "alpha": "alpha",
     }
 
 
@@ -48,13 +48,20 @@ def with_textures(p: Properties, material: Material) -> Material:
         r, g, b = (c / m if m > 0 else 1.0 for c, m in zip(material.reflectance, found["reflectance"].mean))
         if max(abs(r - 1), abs(g - 1), abs(b - 1)) > 1e-6:
             found["reflectance"] = scaled(found["reflectance"], (r, g, b))
-    if not found:
-        return material
-    if sum(name in p.textures for name in _ALPHAS) > 1:
-        p.document.warn(
-            f"{p.element} has two textures of roughness: the last one is used for both directions.", p.element
-        )
+    found |= _roughness(p, material)
     return replace(material, textures={**material.textures, **found})
+
+
+def _roughness(p: Properties, material: Material) -> dict[str, Texture]:
+    """Textures of roughness along and across the tangent. Where one of them is a number, that everywhere."""
+    there = [p.textures.get(name) for name in _ALPHAS]
+    if not any(there):
+        return {}
+    if len([name for name in _ALPHAS if name in p]) == 1:
+        return {"alpha": next(filter(None, there))}
+    constant = [Checkerboard((a, a, a), (a, a, a)) for a in material.alpha]
+    along, across = (texture or number for texture, number in zip(there, constant, strict=True))
+    return {"alpha": along, "alpha_across": across}
 
 
 def mapped(p: Properties, material: Material) -> Material:

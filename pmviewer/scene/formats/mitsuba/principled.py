@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from pmviewer.scene.description import BLACK, Material, Principled
 from pmviewer.scene.formats.mitsuba.document import Properties
 from pmviewer.scene.formats.mitsuba.interface import bounded, share
@@ -83,11 +85,40 @@ def principled_thin(p: Properties, name: str) -> Material:
     if not glass > 0:
         return sheet
     p.document.warn(f"{p.element}: the share 'spec_trans' is shown as smooth thin glass.", p.element)
-    r, g, b = (math.sqrt(c) for c in colour)
-    pane = Material(f"{name} (glass)", "thin dielectric", (1.0, 1.0, 1.0), transmittance=(r, g, b), eta=eta)
+    picture = sheet.textures.get("reflectance")
+    pane = Material(
+        f"{name} (glass)",
+        "thin dielectric",
+        (1.0, 1.0, 1.0),
+        transmittance=colour,
+        eta=_pane_index(eta),
+        textures={} if picture is None else {"transmittance": picture},
+    )
     if glass >= 1:
         return replace(pane, name=name)
     return Material(name, "blend", BLACK, parts=(sheet, pane), weight=glass)
+
+
+def _pane_index(eta: float) -> float:
+    """The index of a pane, reflections between its faces counted, that reflects as much of what comes from all sides
+    as one face of index `eta` does: that is all a sheet reflects. Below 1 it stays what it is."""
+    low, high = 1.0, eta
+    if not eta > 1:
+        return eta
+    sought = _reflected(eta)[0]
+    for _ in range(40):
+        middle = (low + high) / 2
+        low, high = (middle, high) if _reflected(middle)[1] < sought else (low, middle)
+    return (low + high) / 2
+
+
+def _reflected(eta: float) -> tuple[float, float]:
+    """Of light from all sides, by one face and by a pane, whose rays go to and fro: 2R/(1 + R)."""
+    cos = (np.arange(256) + 0.5) / 256
+    inside = np.sqrt(1 - (1 - cos**2) / eta**2)
+    across, along = (cos - eta * inside) / (cos + eta * inside), (eta * cos - inside) / (eta * cos + inside)
+    face = (across**2 + along**2) / 2
+    return float((face * 2 * cos).mean()), float((2 * face / (1 + face) * 2 * cos).mean())
 
 
 def _alphas(p: Properties) -> tuple[float, float]:
@@ -105,8 +136,6 @@ def _textured(p: Properties, material: Material, means: set[str]) -> Material:
         textures["reflectance"] = p.textures["base_color"]
     if "roughness" in p.textures:
         textures["alpha"] = squared_luminance(p.textures["roughness"])
-        if "anisotropic" in p:
-            p.document.warn(f"{p.element}: where a texture gives 'roughness', 'anisotropic' has no effect.", p.element)
     if "metallic" in p.textures and material.principled is not None and "metallic" not in means:
         textures["metallic"] = p.textures["metallic"]
     for name in sorted((means | {"anisotropic", "specular"}) & p.textures.keys()):
