@@ -65,8 +65,8 @@ SLOTS = (
     "weight", "metallic",
 )  # fmt: skip
 """What a material's texture can give: colours, roughness (its luminance; `alpha` is that along the tangent where there
-is `alpha_across`, which principled materials don't have), a tangent-space normal as (n + 1) / 2, a height in scene units
-(its luminance), or one of the numbers of that name (its luminance)."""
+is `alpha_across`, which principled materials don't have), a tangent-space normal as (n + 1) / 2, a height in scene
+units (its luminance), or one of the numbers of that name (its luminance)."""
 
 
 def scaled(texture: Texture, factor: RGB) -> Texture:
