@@ -140,7 +140,7 @@ def analyse(scene: Scene) -> SceneTraits:
         has_other_specular=any(always_followed(m) and not any(m is pane for pane in panes) for m in used),
         has_media=has_media(scene),
         media_emit=media_emitting(scene) > 0,
-        straightest=max((max(abs(m.phase.g), abs(m.phase.g_beside)) for m in scene.media), default=0.0),
+        straightest=max((m.phase.straightest for m in scene.media), default=0.0),
         has_findable_lights=any(isinstance(light, Environment) for light in scene.lights)
         or any(s.radiance is not None and max(s.radiance) > 0 for s in scene.shapes),
         has_scattering=has_media(scene) and any(max(m.albedo) > 0 and max(m.sigma_t) > 0 for m in scene.media),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from pmviewer.kernels.media.phase import RAYLEIGH
 from pmviewer.scene.grid import Grid
 
 RGB = tuple[float, float, float]
@@ -12,12 +13,17 @@ RGB = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Phase:
-    """Henyey and Greenstein's phase function with the mean cosine `g` (0: isotropic, above 0 forward), and in the share
-    `beside` a second one with `g_beside`."""
+    """Henyey and Greenstein's phase function with the mean cosine `g` (0: isotropic, above 0 forward), or Rayleigh's
+    (g = RAYLEIGH), and in the share `beside` a second one with `g_beside`."""
 
     g: float = 0.0
     g_beside: float = 0.0
     beside: float = 0.0
+
+    @property
+    def straightest(self) -> float:
+        """The largest |g| of its lobes; Rayleigh's is as wide as can be."""
+        return max(abs(g) for g in (self.g, self.g_beside, 0.0) if g != RAYLEIGH)
 
 
 @dataclass(frozen=True)

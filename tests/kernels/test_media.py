@@ -10,7 +10,7 @@ from numba import njit
 from scipy.integrate import quad
 from scipy.stats import chi2
 
-from pmviewer.kernels.media.phase import phase, sample_phase
+from pmviewer.kernels.media.phase import RAYLEIGH, phase, sample_phase
 from pmviewer.render.media.distance import (
     equiangular_distance,
     equiangular_pdf,
@@ -23,12 +23,16 @@ D = (f4(0.6), f4(0.0), f4(0.8))
 
 
 def lobe(g, cos):
-    """Henyey and Greenstein's phase function in float64."""
+    """Henyey and Greenstein's phase function in float64, and Rayleigh's."""
+    if g == RAYLEIGH:
+        return 3 / (16 * math.pi) * (1 + cos**2)
     return (1 - g * g) / (4 * math.pi * (1 + g * g - 2 * g * cos) ** 1.5)
 
 
 def lobe_cdf(g, cos):
     """Share of directions whose cosine is below."""
+    if g == RAYLEIGH:
+        return (cos**3 + 3 * cos + 4) / 8
     if abs(g) < 1e-9:
         return (1 + cos) / 2
     return (1 - g * g) / (2 * g) * (1 / np.sqrt(1 + g * g - 2 * g * cos) - 1 / (1 + g))
@@ -50,7 +54,17 @@ def directions(numbers, n=200_000):
 
 
 @pytest.mark.parametrize(
-    "numbers", [(0, 0, 0), (0.0005, 0, 0), (0.5, 0, 0), (-0.7, 0, 0), (0.95, 0, 0), (0.8, -0.4, 0.3)]
+    "numbers",
+    [
+        (0, 0, 0),
+        (0.0005, 0, 0),
+        (0.5, 0, 0),
+        (-0.7, 0, 0),
+        (0.95, 0, 0),
+        (0.8, -0.4, 0.3),
+        (RAYLEIGH, 0, 0),
+        (0.6, RAYLEIGH, 0.5),
+    ],
 )
 def test_directions_follow_the_phase_function(numbers):
     """χ² over 64 bins of equal probability in the cosine, and over the angle around."""

@@ -9,6 +9,7 @@ from pmviewer.engine.immersion import immersed
 from pmviewer.engine.media_plan import BLURRED, LOOKED_FOR
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import open_scene
+from pmviewer.kernels.media.phase import RAYLEIGH
 from pmviewer.kernels.memory import at_address
 from pmviewer.render.camera import resolve_camera
 from pmviewer.scene.arrays.flatten import flatten
@@ -50,6 +51,11 @@ def medium_of(tmp_path, inner):
         ('<phase type="hg"><float name="g" value="-0.4"/></phase>', Medium("fog", phase=Phase(-0.4))),
         ('<phase type="hg"/>', Medium("fog", phase=Phase(0.8))),
         ('<phase type="isotropic"/>', Medium("fog")),
+        ('<phase type="rayleigh"/>', Medium("fog", phase=Phase(RAYLEIGH))),
+        (
+            '<phase type="blendphase"><phase type="hg"/><phase type="rayleigh"/></phase>',
+            Medium("fog", phase=Phase(0.8, RAYLEIGH, 0.5)),
+        ),
         (
             '<phase type="blendphase"><float name="weight" value="0.25"/><phase type="isotropic"/>'
             '<phase type="hg"><float name="g" value="0.9"/></phase></phase>',
@@ -73,7 +79,10 @@ def test_homogeneous_media_are_read_as_they_stand(tmp_path, inner, expected):
 @pytest.mark.parametrize(
     ("inner", "said"),
     [
-        ('<phase type="rayleigh"/>', "scattered alike in all directions"),
+        ('<phase type="microflake"/>', "scattered alike in all directions"),
+        ('<phase type="tabphase"/>', "scattered alike in all directions"),
+        ('<phase type="tabphase"><string name="values" value="1, x"/></phase>', "scattered alike in all directions"),
+        ('<phase type="tabphase"><string name="values" value="0, 1"/></phase>', "with the same mean cosine, 0.33"),
         ('<float name="sigma_t" value="-1"/>', "negative numbers count as 0"),
         ('<float name="albedo" value="1.5"/>', "above 1 was cut"),
         ('<phase type="hg"><float name="g" value="2"/></phase>', "was taken as"),

@@ -1,4 +1,4 @@
-"""Phase functions: Henyey and Greenstein's, isotropic for g = 0, and mixtures of two of them.
+"""Phase functions: Henyey and Greenstein's, isotropic for g = 0, Rayleigh's, and mixtures of two of them.
 
 Directions are those of travel, before and after; the density over the sphere is the value of the phase function, which
 is also the pdf of `sample_phase`. Near |g| = 1 everything is written in 1 − cos, which float32 keeps.
@@ -13,16 +13,23 @@ import numpy as np
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.vector import dot, from_basis, normalize, sub
 
+RAYLEIGH = 2.0
+"""In place of g: molecules, which scatter forward and backward alike."""
+
 _f4 = np.float32
 _TWO_PI = _f4(2.0 * math.pi)
 _INV_FOUR_PI = _f4(0.25 / math.pi)
+_THIRD = _f4(1.0 / 3.0)
 _STRAIGHTEST = _f4(1e-3)
 """|g| below which the lobe is sampled as a sphere's: the inversion divides by g."""
 
 
 @device
 def _lobe(g, d, wi):
-    """Henyey and Greenstein 1941: (1 − g²)/(4π (1 + g² − 2 g cos)^1.5)."""
+    """Henyey and Greenstein 1941: (1 − g²)/(4π (1 + g² − 2 g cos)^1.5); Rayleigh 1871: 3/(16π) (1 + cos²)."""
+    if g > _f4(1.0):
+        cos = dot(d, wi)
+        return _f4(0.75) * _INV_FOUR_PI * (_f4(1.0) + cos * cos)
     if g < _f4(0.0):
         g, wi = -g, (-wi[0], -wi[1], -wi[2])
     apart = sub(d, wi)
@@ -45,6 +52,11 @@ def phase(numbers, d, wi):
 @device
 def _lift(g, u):
     """1 − cos of a direction by the lobe with g ≥ 0."""
+    if g > _f4(1.0):
+        # The real root of cos³ + 3 cos + 4 = 8u (Cardano).
+        q = _f4(4.0) * u - _f4(2.0)
+        z = (q + _f4(math.sqrt(q * q + _f4(1.0)))) ** _THIRD
+        return _f4(1.0) - (z - _f4(1.0) / z)
     if g < _STRAIGHTEST:
         # First order in g of the inversion below.
         return _f4(2.0) * u * (_f4(1.0) - _f4(3.0) * g * (_f4(1.0) - u))

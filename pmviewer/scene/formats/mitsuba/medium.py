@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pmviewer.kernels.media.phase import RAYLEIGH
 from pmviewer.scene.description import Material, Medium
 from pmviewer.scene.formats.mitsuba.document import Document, Properties
 from pmviewer.scene.formats.mitsuba.interface import bounded
@@ -137,12 +138,35 @@ def _phase(p: Properties) -> Phase:
     return _phase_of(Properties(found[0], p.document, 1))
 
 
+def _mean_cosine(p: Properties) -> float | None:
+    """Of a table of values over cosines from −1 to 1, linear in between; None where it says nothing."""
+    try:
+        values = np.array(p.string("values", "").replace(",", " ").split(), float)
+    except ValueError:
+        return None
+    if len(values) < 2 or not np.all(np.isfinite(values)) or not np.any(values := np.maximum(values, 0.0)):
+        return None
+    low, high = values[:-1], values[1:]
+    edges = np.linspace(-1, 1, len(values))
+    # Of a linear piece the first moment is that of a trapezoid.
+    moments = low * (2 * edges[:-1] + edges[1:]) + high * (edges[:-1] + 2 * edges[1:])
+    return float(np.clip(moments.sum() / (3 * (low + high).sum()), -_STRAIGHTEST, _STRAIGHTEST))
+
+
 def _phase_of(p: Properties) -> Phase:
     if p.type == "isotropic":
         p.warn_unused()
         return Phase()
     if p.type == "hg":
         g = bounded(p, "g", p.number("g", 0.8), -_STRAIGHTEST, _STRAIGHTEST)
+        p.warn_unused()
+        return Phase(g)
+    if p.type == "rayleigh":
+        p.warn_unused()
+        return Phase(RAYLEIGH)
+    if p.type == "tabphase" and (g := _mean_cosine(p)) is not None:
+        what = f"{p.element} is shown as 'hg' with the same mean cosine, {g:.2g}."
+        p.document.warn(what, p.element)
         p.warn_unused()
         return Phase(g)
     parts = p.objects("phase")
