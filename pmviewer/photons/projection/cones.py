@@ -51,17 +51,16 @@ def gain_of(geometry: Geometry | None, position: Float | None, small: Small) -> 
     away = small.center - points
     distance = np.linalg.norm(away, axis=1)
     outside = distance > small.radius
-    if not outside.any():
-        return 1.0
-    away, distance, weights = away[outside], distance[outside], weights[outside]
-    cones = np.maximum(np.ceil(np.log2(distance / small.radius)), 1.0)
-    sees = (small.radius / distance) ** 2
+    ratio = np.minimum(small.radius / np.maximum(distance, 1e-300), 1.0)
+    cones = np.maximum(np.ceil(-np.log2(ratio)), 1.0)
     if normals is None:
-        share = (1 - np.sqrt(1 - sees)) / 2
+        share = (1 - np.sqrt(1 - ratio**2)) / 2
     else:
-        share = sees * np.maximum(np.einsum("ij,ij->i", away, normals[outside]) / distance, 0.0)
-    usual, aimed = float(share @ weights), float(((1 - EVERYWHERE) / cones * (share > 0)) @ weights)
-    return EVERYWHERE + aimed / usual if usual > 0 else 1.0
+        cos = np.einsum("ij,ij->i", away, normals) / np.maximum(distance, 1e-300)
+        share = np.where(outside, ratio**2 * np.maximum(cos, 0.0), 1.0)
+    aimed = np.where(outside, EVERYWHERE * share + (1 - EVERYWHERE) / cones * (share > 0), share)
+    usual = float(share @ weights)
+    return float(aimed @ weights) / usual if usual > 0 else 1.0
 
 
 def _places(geometry: Geometry) -> tuple[Float, Float, Float]:

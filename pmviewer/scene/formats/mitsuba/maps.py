@@ -58,7 +58,7 @@ def _roughness(p: Properties, material: Material) -> dict[str, Texture]:
     if not any(there):
         return {}
     if len([name for name in _ALPHAS if name in p]) == 1:
-        return {"alpha": next(filter(None, there))}
+        return {"alpha": next(texture for texture in there if texture is not None)}
     constant = [Checkerboard((a, a, a), (a, a, a)) for a in material.alpha]
     along, across = (texture or number for texture, number in zip(there, constant, strict=True))
     return {"alpha": along, "alpha_across": across}

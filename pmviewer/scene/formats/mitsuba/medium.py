@@ -164,11 +164,11 @@ def _phase_of(p: Properties) -> Phase:
     if p.type == "rayleigh":
         p.warn_unused()
         return Phase(RAYLEIGH)
-    if p.type == "tabphase" and (g := _mean_cosine(p)) is not None:
-        what = f"{p.element} is shown as 'hg' with the same mean cosine, {g:.2g}."
+    if p.type == "tabphase" and (mean := _mean_cosine(p)) is not None:
+        what = f"{p.element} is shown as 'hg' with the same mean cosine, {mean:.2g}."
         p.document.warn(what, p.element)
         p.warn_unused()
-        return Phase(g)
+        return Phase(mean)
     parts = p.objects("phase")
     if p.type == "blendphase" and len(parts) == 2:
         first, second = (_phase_of(Properties(part, p.document, 2)) for part in parts)
