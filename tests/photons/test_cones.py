@@ -212,11 +212,11 @@ def test_power_of_the_maps_is_the_same_and_better_known(lamps):
     np.testing.assert_allclose(energy[0], energy[1], rtol=0.05, atol=0.01 * flat.total_luminance)
 
 
-def test_a_dome_a_million_times_as_large():
-    """Cones narrower than float32 tells directions apart would count photons beside them: the power that goes by what
-    is small is right there, too."""
-    scene, n = stage("dome"), 400_000
-    vast = tuple(replace(s, geometry=Sphere((0, 0, 0), 1e6, True)) if s.name == "dome" else s for s in scene.shapes)
+def test_a_dome_ten_million_times_as_large():
+    """Cones narrower than float32 tells directions apart miss photons that aim at them, which then count for too much
+    (1.037 times at 5 m): the power that goes by what is small is right there, too."""
+    scene, n = stage("dome"), 2_000_000
+    vast = tuple(replace(s, geometry=Sphere((0, 0, 0), 1e7, True)) if s.name == "dome" else s for s in scene.shapes)
     flat = flatten(replace(scene, shapes=vast))
     projection = projection_of(flat)
     rng = np.random.default_rng(5)
@@ -226,11 +226,11 @@ def test_a_dome_a_million_times_as_large():
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
     away = SMALL.center - origins
     miss = np.linalg.norm(np.cross(away, ways), axis=1)
-    for radius in (200.0, 1000.0):
+    for radius in (5.0, 20.0, 100.0):
         inside = miss <= radius
-        share, error = (radius / 1e6) ** 2, math.sqrt((factors[inside] ** 2).sum()) / n
+        share, error = (radius / 1e7) ** 2, math.sqrt((factors[inside] ** 2).sum()) / n
         print(f"{radius:g}: {factors[inside].sum() / n:.4g} ± {error:.2g} of the power, {share:.4g} expected")
-        assert factors[inside].sum() / n == pytest.approx(share, abs=4 * error)
+        assert factors[inside].sum() / n == pytest.approx(share, abs=3 * error + 0.01 * share)
 
 
 def test_lamps_whose_light_is_wasted_get_no_more_photons_than_they_bring():

@@ -59,7 +59,7 @@ LEAST_GAIN = {SCALES: 8.0, CONES: 16.0}
 Skies, gains of 3 to 7 in three scenes: relMSE after 4 CPU s 0.8 to 1.5 times that without, 1.0 in the mean. Lamps
 nearby, 5 to 9 in a prism's yard, three glasses and rings: 1.0 to 1.7 times after 5, of a ship under a dome (355) 0.24.
 """
-SMALLEST = 1e-4
+SMALLEST = 1e-6
 """Least radius of the innermost disc or cone, relative to the scene's: float32 tells directions apart to 6e-8."""
 MOST_GAIN = 2.0**10
 """Times that photons start more densely for what is small, and have more power where they don't: stored powers end at
