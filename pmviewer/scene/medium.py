@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from pmviewer.kernels.media.phase import RAYLEIGH
+from pmviewer.kernels.media.kinds import RAYLEIGH
 from pmviewer.scene.grid import Grid
 
 RGB = tuple[float, float, float]

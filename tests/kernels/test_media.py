@@ -10,7 +10,8 @@ from numba import njit
 from scipy.integrate import quad
 from scipy.stats import chi2
 
-from pmviewer.kernels.media.phase import RAYLEIGH, phase, sample_phase
+from pmviewer.kernels.media.kinds import RAYLEIGH
+from pmviewer.kernels.media.phase import phase, sample_phase
 from pmviewer.render.media.distance import (
     equiangular_distance,
     equiangular_pdf,

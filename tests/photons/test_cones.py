@@ -11,7 +11,8 @@ import pytest
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.maps.record import DIRECT, unpack
 from pmviewer.photons.light_pass.light_pass import trace_pass
-from pmviewer.photons.projection.cones import gain_of, start_in_cones
+from pmviewer.photons.projection.cones import start_in_cones
+from pmviewer.photons.projection.gain import gain_of
 from pmviewer.photons.projection.projection import projection_of
 from pmviewer.photons.projection.small import Small, small_of
 from pmviewer.scene.arrays.flatten import LUMINANCE, bounding_sphere, flatten

@@ -9,7 +9,7 @@ from pmviewer.engine.immersion import immersed
 from pmviewer.engine.media_plan import BLURRED, LOOKED_FOR
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import open_scene
-from pmviewer.kernels.media.phase import RAYLEIGH
+from pmviewer.kernels.media.kinds import RAYLEIGH
 from pmviewer.kernels.memory import at_address
 from pmviewer.render.camera import resolve_camera
 from pmviewer.scene.arrays.flatten import flatten

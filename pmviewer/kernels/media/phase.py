@@ -11,15 +11,14 @@ import math
 import numpy as np
 
 from pmviewer.kernels.compile.jit import device
+from pmviewer.kernels.media.kinds import RAYLEIGH
 from pmviewer.kernels.vector import dot, from_basis, normalize, sub
-
-RAYLEIGH = 2.0
-"""In place of g: molecules, which scatter forward and backward alike."""
 
 _f4 = np.float32
 _TWO_PI = _f4(2.0 * math.pi)
 _INV_FOUR_PI = _f4(0.25 / math.pi)
 _THIRD = _f4(1.0 / 3.0)
+_RAYLEIGH = _f4(RAYLEIGH)
 _STRAIGHTEST = _f4(1e-3)
 """|g| below which the lobe is sampled as a sphere's: the inversion divides by g."""
 
@@ -27,7 +26,7 @@ _STRAIGHTEST = _f4(1e-3)
 @device
 def _lobe(g, d, wi):
     """Henyey and Greenstein 1941: (1 − g²)/(4π (1 + g² − 2 g cos)^1.5); Rayleigh 1871: 3/(16π) (1 + cos²)."""
-    if g > _f4(1.0):
+    if g == _RAYLEIGH:
         cos = dot(d, wi)
         return _f4(0.75) * _INV_FOUR_PI * (_f4(1.0) + cos * cos)
     if g < _f4(0.0):
@@ -42,7 +41,7 @@ def _lobe(g, d, wi):
 @device
 def phase(numbers, d, wi):
     """Value of the phase function from the direction of travel d to wi, per solid angle. numbers: (g, g of the second
-    lobe, its share)."""
+    lobe, its share), RAYLEIGH in place of a g."""
     value = _lobe(numbers[0], d, wi)
     if numbers[2] > _f4(0.0):
         value = (_f4(1.0) - numbers[2]) * value + numbers[2] * _lobe(numbers[1], d, wi)
@@ -52,7 +51,7 @@ def phase(numbers, d, wi):
 @device
 def _lift(g, u):
     """1 − cos of a direction by the lobe with g ≥ 0."""
-    if g > _f4(1.0):
+    if g == _RAYLEIGH:
         # The real root of cos³ + 3 cos + 4 = 8u (Cardano).
         q = _f4(4.0) * u - _f4(2.0)
         z = (q + _f4(math.sqrt(q * q + _f4(1.0)))) ** _THIRD

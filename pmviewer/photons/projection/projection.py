@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pmviewer.kernels import scene as K
 from pmviewer.photons.projection.bounds import enclosing, spheres_of
 from pmviewer.photons.projection.cells import SLACK, cells_of_directions, cells_of_places
-from pmviewer.photons.projection.cones import gain_of
+from pmviewer.photons.projection.gain import gain_of
 from pmviewer.photons.projection.projected import (
     COLUMNS,
     CONES,

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pmviewer.kernels.media.phase import RAYLEIGH
+from pmviewer.kernels.media.kinds import RAYLEIGH
 from pmviewer.scene.description import Material, Medium
 from pmviewer.scene.formats.mitsuba.document import Document, Properties
 from pmviewer.scene.formats.mitsuba.interface import bounded
