@@ -22,7 +22,7 @@ from pmviewer.settings.access import Settings
 if TYPE_CHECKING:  # numba, which the window doesn't wait for
     from pmviewer.photons.deposition.deposited import Deposited
     from pmviewer.photons.emission.light_importance import LightImportance
-    from pmviewer.photons.projection.projection import ProjectionMap
+    from pmviewer.photons.projection.light_map import ProjectionMap
 
 State = Literal["empty", "loading", "preparing", "rendering", "paused", "finished", "failed"]
 Level = Literal["info", "warning", "error"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from dataclasses import replace
 
 import numpy as np
@@ -43,7 +44,7 @@ def _look_up(scenes, texture, uv, rgb, gradient):
 
 
 @kernel
-def _look(scenes, origins, directions, hit, p, uv, du, dv, reflectance, alpha, ng, ns, tangent, corners):
+def _look(scenes, origins, directions, hit, out):
     scene = scenes[0]
     for i in range(len(origins)):
         o = (origins[i, 0], origins[i, 1], origins[i, 2])
@@ -51,17 +52,17 @@ def _look(scenes, origins, directions, hit, p, uv, du, dv, reflectance, alpha, n
         t, prim, b1, b2 = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], np.float32(0), np.float32(np.inf))
         hit[i] = prim
         if prim >= 0:
-            p[i], ng[i], s, _ = surface_at(scene, prim, b1, b2, o[0], o[1], o[2], d[0], d[1], d[2], t)
-            q, n = (p[i, 0], p[i, 1], p[i, 2]), (ng[i, 0], ng[i, 1], ng[i, 2])
-            uv[i] = hit_uv(scene, prim, b1, b2, q)
-            du[i], dv[i] = hit_tangents(scene, prim, q, n)
+            out.p[i], out.ng[i], s, _ = surface_at(scene, prim, b1, b2, o[0], o[1], o[2], d[0], d[1], d[2], t)
+            q, n = (out.p[i, 0], out.p[i, 1], out.p[i, 2]), (out.ng[i, 0], out.ng[i, 1], out.ng[i, 2])
+            out.uv[i] = hit_uv(scene, prim, b1, b2, q)
+            out.du[i], out.dv[i] = hit_tangents(scene, prim, q, n)
             material = material_of(scene, prim)
             numbers = texture_params(scene, material, prim, b1, b2, q)
-            reflectance[i] = numbers.reflectance
-            alpha[i] = (numbers.ax, numbers.ay)
-            ns[i], tangent[i] = shading_frame(scene, material, prim, b1, b2, q, n, s, n)
+            out.reflectance[i] = numbers.reflectance
+            out.alpha[i] = (numbers.ax, numbers.ay)
+            out.ns[i], out.tangent[i] = shading_frame(scene, material, prim, b1, b2, q, n, s, n)
             c1, c2 = barycentrics(scene, prim, q)
-            corners[i] = (c1 - b1, c2 - b2)
+            out.corners[i] = (c1 - b1, c2 - b2)
 
 
 @kernel
@@ -81,17 +82,18 @@ def textured(geometry, **changes):
     )
 
 
-NAMES = ("p", "uv", "du", "dv", "reflectance", "alpha", "ng", "ns", "tangent", "corners")
+Seen = namedtuple("Seen", "p uv du dv reflectance alpha ng ns tangent corners")
+"""Arrays of what the kernel says, by ray."""
 
 
 def look(scene, origins, directions):
     """Rays that meet the scene: everything that the kernel says there, by name, of those that hit the first shape."""
     flat, n = flatten(scene), len(origins)
     width = {"uv": 2, "alpha": 2, "corners": 2}
-    out = {name: np.zeros((n, width.get(name, 3)), np.float32) for name in NAMES}
+    out = {name: np.zeros((n, width.get(name, 3)), np.float32) for name in Seen._fields}
     hit = np.zeros(n, np.int64)
     o, d = (np.ascontiguousarray(a, np.float32) for a in (origins, directions))
-    _look(flat.record, o, d, hit, *out.values())
+    _look(flat.record, o, d, hit, Seen(**out))
     own = hit >= 0
     own[own] = np.isin(hit[own], np.flatnonzero(np.ctypeslib.as_array(_materials(flat)) == 1))
     return {name: a[own].astype(float) for name, a in out.items()}

@@ -29,7 +29,7 @@ from pmviewer.scene.description import (
     Sphere,
 )
 from pmviewer.settings.access import Photons
-from tests.support.scenes import ball_mesh, box_walls, cube_mesh, diffuse, rendered, settings_of
+from tests.support.scenes import ball_mesh, box_walls, cube_mesh, diffuse, means_by_method
 
 pytestmark = pytest.mark.usefixtures("every_surface")
 
@@ -255,15 +255,6 @@ def test_lamps_whose_light_is_wasted_get_no_more_photons_than_they_bring():
 
 @pytest.mark.slow
 def test_all_methods_show_the_same_stage():
-    means = {}
-    for name, passes, groups in (
-        ("path", 1024, {}),
-        ("progressive", 32, {"estimate": {"radius": 1e-3}}),
-        ("gather", 32, {"estimate": {"radius": 1e-3}}),
-    ):
-        settings = settings_of(render={"method": name}, photons={"N": 40_000}, **groups)
-        image = rendered(stage("dome", "point"), settings, passes).frame(1).image("beauty")
-        means[name] = float(image.astype(np.float64).mean())
-    print(means)
+    means = means_by_method(stage("dome", "point"), 1024)
     assert means["progressive"] == pytest.approx(means["path"], rel=0.02)
     assert means["gather"] == pytest.approx(means["path"], rel=0.02)

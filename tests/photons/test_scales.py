@@ -34,7 +34,7 @@ from pmviewer.scene.description import (
     Sphere,
 )
 from pmviewer.settings.access import Photons
-from tests.support.scenes import ball_mesh, box_walls, cube_mesh, diffuse, rendered, settings_of
+from tests.support.scenes import ball_mesh, box_walls, cube_mesh, diffuse, means_by_method, settings_of
 
 pytestmark = pytest.mark.usefixtures("every_surface")
 
@@ -182,16 +182,7 @@ def test_power_of_the_maps_is_the_same_and_better_known(light):
 @pytest.mark.parametrize("lights", [(SKY,), (SUN, SKY)], ids=["sky", "sun and sky"])
 def test_all_methods_show_the_same_yard(lights):
     """Photons being few, their noise is a percent or two; without scales it is ten."""
-    means = {}
-    for name, passes, groups in (
-        ("path", 512, {}),
-        ("progressive", 32, {"estimate": {"radius": 1e-3}}),
-        ("gather", 32, {"estimate": {"radius": 1e-3}}),
-    ):
-        settings = settings_of(render={"method": name}, photons={"N": 40_000}, **groups)
-        image = rendered(yard(lights=lights), settings, passes).frame(1).image("beauty")
-        means[name] = float(image.astype(np.float64).mean())
-    print(means)
+    means = means_by_method(yard(lights=lights), 512)
     assert means["progressive"] == pytest.approx(means["path"], rel=0.04)
     assert means["gather"] == pytest.approx(means["path"], rel=0.04)
 

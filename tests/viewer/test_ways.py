@@ -11,7 +11,7 @@ from pmviewer.output.exr import read_exr
 from pmviewer.output.falsecolour import COLOURS
 from pmviewer.output.frame_export import layer_name
 from pmviewer.output.tone import to_uint8
-from pmviewer.photons.projection.projection import ProjectionMap
+from pmviewer.photons.projection.light_map import ProjectionMap
 from pmviewer.settings.access import get
 from pmviewer.viewer.gl.palette import FATE_PALETTE, LIGHT_PALETTE, LIT_COLOUR, SHADOW_COLOUR
 from pmviewer.viewer.gl.records import directions, encoded

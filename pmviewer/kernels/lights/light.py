@@ -432,7 +432,7 @@ def _emitter_of_others(scene):
 @device
 def light_start(scene, light, position):
     """Where a photon leaves an area light, as by `light_point`, and its power of luminance 1, or nearly for a textured
-    one; of a point light there are the place and the power alone."""
+    one. A point light has the gap 0, and normals that mean nothing."""
     L = light_vector(scene, light, L_RADIANCE)
     if np.int32(light_number(scene, light, L_KIND)) == POINT:
         up = (_f4(0.0), _f4(0.0), _f4(1.0))
@@ -444,18 +444,22 @@ def light_start(scene, light, position):
 
 
 @device
-def _emit_plain(scene, light, position, direction):
-    kind = np.int32(light_number(scene, light, L_KIND))
-    L = light_vector(scene, light, L_RADIANCE)
-    beta = scale(L, _f4(1.0) / luminance(L))
-    if kind == POINT:
-        return light_vector(scene, light, L_A), square_to_sphere(direction[0], direction[1]), beta
-    if kind == ENVIRONMENT:
-        d = square_to_sphere(direction[0], direction[1])
-        return behind_scene(scene, d, position[0], position[1]), d, beta
-    p, n, front, gap, beta = light_start(scene, light, position)
-    local = square_to_cosine_hemisphere(direction[0], direction[1])
+def light_direction(scene, light, n, front, u, v):
+    """A direction in which a photon leaves there: of an area light by the cosine to its normal n, on the side of
+    `front`, of a point light any."""
+    if np.int32(light_number(scene, light, L_KIND)) == POINT:
+        return square_to_sphere(u, v)
+    local = square_to_cosine_hemisphere(u, v)
     d = from_basis(n, local[0], local[1], local[2])
-    if dot(front, d) < _f4(0.0):
-        d = scale(d, _f4(-1.0))
+    return scale(d, _f4(-1.0)) if dot(front, d) < _f4(0.0) else d
+
+
+@device
+def _emit_plain(scene, light, position, direction):
+    if np.int32(light_number(scene, light, L_KIND)) == ENVIRONMENT:
+        L = light_vector(scene, light, L_RADIANCE)
+        d = square_to_sphere(direction[0], direction[1])
+        return behind_scene(scene, d, position[0], position[1]), d, scale(L, _f4(1.0) / luminance(L))
+    p, n, front, gap, beta = light_start(scene, light, position)
+    d = light_direction(scene, light, n, front, direction[0], direction[1])
     return leave(p, n, gap, d[0], d[1], d[2]), d, beta

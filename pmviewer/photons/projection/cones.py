@@ -17,11 +17,11 @@ import math
 import numpy as np
 
 from pmviewer.kernels.compile.jit import device
-from pmviewer.kernels.lights.light import light_start
+from pmviewer.kernels.lights.light import light_direction, light_start
 from pmviewer.kernels.scene import L_KIND, POINT, light_number
 from pmviewer.kernels.surface import leave
 from pmviewer.kernels.vector import dot, from_basis, scale, sub
-from pmviewer.kernels.warp import square_to_cone, square_to_cosine_hemisphere, square_to_sphere
+from pmviewer.kernels.warp import square_to_cone
 from pmviewer.photons.projection.scales import EVERYWHERE
 
 _f4 = np.float32
@@ -50,15 +50,9 @@ def start_in_cones(scene, projection, light, position, direction):
     if cones == 0 or u < _EVERYWHERE:
         if cones > 0:
             u /= _EVERYWHERE
-        if point:
-            d = square_to_sphere(u, v)
-        else:
-            local = square_to_cosine_hemisphere(u, v)
-            d = from_basis(n, local[0], local[1], local[2])
-            if dot(front, d) < _f4(0.0):
-                d = scale(d, _f4(-1.0))
+        d = light_direction(scene, light, n, front, u, v)
         if cones == 0:
-            return _left(point, p, n, gap, d), d, beta, _f4(1.0)
+            return leave(p, n, gap, d[0], d[1], d[2]), d, beta, _f4(1.0)
     else:
         u = (u - _EVERYWHERE) / _NEAR * _f4(cones)
         k = min(_i8(u), cones - _i8(1))
@@ -77,16 +71,10 @@ def start_in_cones(scene, projection, light, position, direction):
         if apart <= one_minus_cos:
             m += _f4(2.0) / one_minus_cos if point else _f4(0.5) / (one_minus_cos * cos)
         sin2 *= _f4(4.0)
-    return _left(point, p, n, gap, d), d, beta, _f4(1.0) / (_EVERYWHERE + _NEAR / _f4(cones) * m)
+    return leave(p, n, gap, d[0], d[1], d[2]), d, beta, _f4(1.0) / (_EVERYWHERE + _NEAR / _f4(cones) * m)
 
 
 @device
 def _narrow(sin2):
     """1 − cosine of an angle of that squared sine."""
     return sin2 / (_f4(1.0) + _f4(math.sqrt(max(_f4(1.0) - sin2, _f4(0.0)))))
-
-
-@device
-def _left(point, p, n, gap, d):
-    """Where a photon starts that leaves a light at p."""
-    return p if point else leave(p, n, gap, d[0], d[1], d[2])

@@ -20,7 +20,7 @@ from pmviewer.viewer.overlays.legend import MOST_SWATCHES, swatches, wrapped
 from pmviewer.viewer.overlays.overlay import Needs, Overlay, Source, Switch
 
 if TYPE_CHECKING:
-    from pmviewer.photons.projection.projection import ProjectionMap
+    from pmviewer.photons.projection.light_map import ProjectionMap
 
 DIRECTIONS = ("directions", "world directions")
 PLACES = ("places",)

@@ -49,7 +49,7 @@ def with_textures(p: Properties, material: Material) -> Material:
         if max(abs(r - 1), abs(g - 1), abs(b - 1)) > 1e-6:
             found["reflectance"] = scaled(found["reflectance"], (r, g, b))
     found |= _roughness(p, material)
-    return replace(material, textures={**material.textures, **found})
+    return replace(material, textures={**material.textures, **found}) if found else material
 
 
 def _roughness(p: Properties, material: Material) -> dict[str, Texture]:

@@ -55,7 +55,8 @@ def principled(p: Properties, name: str) -> Material:
 
 def principled_thin(p: Properties, name: str) -> Material:
     """A sheet without an inside: in the share 1 − `spec_trans` diffuse and sheen on both sides, or, in half of
-    `diff_trans`, diffuse light through; thin glass in the rest."""
+    `diff_trans`, diffuse light through; in the rest smooth thin glass, which tints what passes and reflects about as
+    much as one face."""
     numbers = {n: share(p, n) for n in _THIN_SHARES}
     glass = share(p, "spec_trans")
     through = bounded(p, "diff_trans", p.roughness("diff_trans", 0.0), 0.0, 2.0) / 2
