@@ -17,14 +17,13 @@ def projection_for(scene: OpenScene, settings: Settings) -> Projection | None:
     wanted, plan = settings.photons.projection, plan_of(settings, scene.traits)
     if wanted == "off" or not plan.photons or plan.emission != "off":
         return None
-    if scene.traits.lit_media:  # media scatter to anywhere
-        return None
     if wanted == "auto" and len(scene.flat.light_names) > MOST_LIGHTS:
         return None
     traced, filling, _ = trajectories(settings.photons, settings.photons.N, bool(plan.caustic_classes))
     key = (wanted, traced > filling)
     if key not in scene.projections:
-        made = projection_of(scene.flat, wanted == "on", traced > filling)
-        useful = made.surface_power > 0 and (wanted == "on" or made.spares)  # else no photon would start at all
+        confined = not scene.traits.lit_media
+        made = projection_of(scene.flat, wanted == "on", traced > filling, confined)
+        useful = made.surface_power > 0 and (wanted == "on" and confined or made.spares)  # else none would start at all
         scene.projections[key] = made if useful else None
     return scene.projections[key]

@@ -120,8 +120,8 @@ def map_of(scene: FlatScene, light: int, spheres: Float) -> tuple[ProjectionMap,
     else:
         edges = np.arccos(1 - 2 * u)
     mode = WORLD if kind in (K.SPHERE, K.CYLINDER, K.MESH) else DIRECTIONS
-    if mode == WORLD and _textured(scene, light):
-        return whole(scene, light)
+    if mode == WORLD and isinstance(described, Shape) and described.emission is not None:
+        return whole(scene, light)  # its places do not all emit alike
     axes = orthonormal(axis)
     on = cells_of_directions(spheres, origin, reach, axes, edges)
     return _celled(scene, light, mode, on, edges, axes, origin, 4.0 if mode == WORLD else 1.0)
@@ -144,19 +144,9 @@ def _celled(
 
 
 def described_light(scene: FlatScene, light: int) -> object:
-    """The light's description when it has no surface; lights with one come first in the table."""
-    index = light - (len(scene.light_names) - len(scene.owner.lights))
-    return scene.owner.lights[index] if index >= 0 else None
-
-
-def _textured(scene: FlatScene, light: int) -> bool:
-    """Is it a shape whose places do not all emit alike?"""
-    return light < len(scene.light_names) - len(scene.owner.lights) and light_shape(scene, light).emission is not None
-
-
-def light_shape(scene: FlatScene, light: int) -> Shape:
-    """That of a light which has a surface."""
-    return [shape for shape in scene.owner.shapes if shape.shines][light]
+    """The shape that emits, or the light without a surface, in the order of the table; None of a medium that emits."""
+    described = [*(shape for shape in scene.owner.shapes if shape.shines), *scene.owner.lights]
+    return described[light] if light < len(described) else None
 
 
 def _extent(scene: FlatScene, light: int) -> tuple[Float, float, Float]:

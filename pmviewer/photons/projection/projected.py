@@ -7,8 +7,8 @@ covered power Φ·c, so that all photons have the same power Σ Φ·c / n (the p
 ==========  ===================================  ==========================================================
 mode        lights                               what is confined
 ==========  ===================================  ==========================================================
-WHOLE       projectors, and any whose map would  nothing, c = 1
-            cover all
+WHOLE       projectors, media that emit, and     nothing, c = 1
+            any whose map would cover all
 DIRECTIONS  points, spots, parallelograms, disks cells of directions around the light's axis
 PLACES      directional lights                   cells of the disc that photons start on
 WORLD       spheres, cylinders, meshes           cells of directions in the world; a photon is kept with the
@@ -162,7 +162,7 @@ def emission(scene, projection, i, sequence, seed, index, u_pick, position, dire
                 return p, d, beta, light, factor > _f4(0.0), factor * load_f4(projection.gains, light)
             if mode == DISC:
                 p = _on_disc(scene, projection, d, position)
-            return p, d, beta, light, True, _f4(1.0)
+            return p, d, beta, light, largest(beta) > _f4(0.0), _f4(1.0)
         low = load_f4(projection.cdf, light)
         rest = min((u_pick - low) / (load_f4(projection.cdf, light + 1) - low), _BELOW_ONE)
         cell = _i8(load_i4(projection.cells, first + min(_i8(rest * _f4(count)), count - 1)))

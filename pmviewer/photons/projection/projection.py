@@ -17,7 +17,6 @@ from pmviewer.photons.projection.light_map import (
     MODES,
     ProjectionMap,
     described_light,
-    light_shape,
     map_of,
     slack,
     whole,
@@ -26,7 +25,7 @@ from pmviewer.photons.projection.projected import CONES, PROJECTION_DTYPE, SCALE
 from pmviewer.photons.projection.scales import gain, scales
 from pmviewer.photons.projection.small import Small, small_of
 from pmviewer.scene.arrays.flatten import FlatScene
-from pmviewer.scene.description import LUMINANCE, DirectionalLight, Environment, PointLight
+from pmviewer.scene.description import LUMINANCE, DirectionalLight, Environment, PointLight, Shape
 
 Float = NDArray[np.float64]
 WORTHWHILE = 0.7
@@ -72,9 +71,12 @@ class Projection:
         return any(m.mode != MODES[WHOLE] for m in self.surfaces + self.caustic)
 
 
-def projection_of(scene: FlatScene, always: bool = True, with_caustics: bool = True) -> Projection:
+def projection_of(
+    scene: FlatScene, always: bool = True, with_caustics: bool = True, confined: bool = True
+) -> Projection:
     """Projection maps of the scene's lights. Unless `always`, those that spare little are replaced by none at all;
-    `with_caustics` says whether there are trajectories for the caustic map alone."""
+    `with_caustics` says whether there are trajectories for the caustic map alone. Unless `confined`, photons start
+    anywhere, and are at most denser for what is small: media that scatter are met where no surface is."""
     records = np.zeros(2, PROJECTION_DTYPE)
     arrays: list[NDArray] = []
     charted: list[tuple[tuple[ProjectionMap, ...], float, float]] = []
@@ -86,7 +88,7 @@ def projection_of(scene: FlatScene, always: bool = True, with_caustics: bool = T
     for record, for_caustics in zip(records, (False, True), strict=True):
         spheres = spheres_of(scene.owner, for_caustics)
         if with_caustics or not for_caustics:
-            maps = [_denser_or_map(scene, light, spheres, small) for light in range(len(scene.light_names))]
+            maps = [_denser_or_map(scene, i, spheres, small, confined) for i in range(len(scene.light_names))]
         else:
             maps = [whole(scene, light) for light in range(len(scene.light_names))]
         covered = scene.light_power @ LUMINANCE * [c for _, c in maps]
@@ -122,10 +124,12 @@ def projection_of(scene: FlatScene, always: bool = True, with_caustics: bool = T
 _CELLED = ("directions", "places", "world directions")
 
 
-def _denser_or_map(scene: FlatScene, light: int, spheres: Float, small: Small | None) -> tuple[ProjectionMap, float]:
+def _denser_or_map(
+    scene: FlatScene, light: int, spheres: Float, small: Small | None, confined: bool
+) -> tuple[ProjectionMap, float]:
     """What makes photons denser at what is small: more of them that start near it or aim at it, or the light's map.
     With c, the share of its power that its photons bring."""
-    found, c = map_of(scene, light, spheres)
+    found, c = map_of(scene, light, spheres) if confined else whole(scene, light)
     mode, times = _gain(scene, light, small) if small is not None and c > 0 else (WHOLE, 1.0)
     if small is None or mode == WHOLE or times * c <= LEAST_GAIN[mode]:
         return found, c
@@ -140,6 +144,6 @@ def _gain(scene: FlatScene, light: int, small: Small) -> tuple[int, float]:
         return SCALES, gain(small.radius, scene.radius)
     if isinstance(described, PointLight):
         return CONES, gain_of(None, np.array(described.position, float), small)
-    if described is None:
-        return CONES, gain_of(light_shape(scene, light).geometry, None, small)
+    if isinstance(described, Shape):
+        return CONES, gain_of(described.geometry, None, small)
     return WHOLE, 1.0
