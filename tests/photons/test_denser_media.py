@@ -1,0 +1,96 @@
+"""Media that scatter on a stage: photons aim more densely at what is small there, and none is confined."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pmviewer.engine.opened import open_scene
+from pmviewer.engine.stages.projection import projection_for
+from pmviewer.maps.record import unpack
+from pmviewer.photons.light_pass.light_pass import trace_pass
+from pmviewer.photons.projection.projection import projection_of
+from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
+from pmviewer.scene.description import ConstantEnvironment, Material, Medium
+from pmviewer.settings.access import Photons
+from tests.photons.test_cones import stage
+from tests.support.scenes import cornell_box, means_by_method, settings_of
+
+pytestmark = [pytest.mark.usefixtures("every_surface"), pytest.mark.usefixtures("any_light_in_media")]
+
+FOG = Medium("fog", (2.0, 1.5, 1.0), (0.9, 0.8, 0.7))
+FLAME = replace(FOG, name="flame", emission=(0.5, 0.3, 0.1))
+SKY = (ConstantEnvironment("sky", (1.0, 0.9, 0.8)),)
+STAGES = {
+    "dome": (("dome",), (), FOG, {"dome": "cones"}),
+    "dome and a flame": (("dome",), (), FLAME, {"dome": "cones", "flame": "whole"}),
+    "sky and a point": (("point",), SKY, FOG, {"point": "cones", "sky": "scales"}),
+}
+
+
+def foggy(lamps, lights, medium):
+    """The stage, its ship a ball of the medium that nothing bounds."""
+    scene = stage(*lamps)
+    null = Material("boundary", "null", (0.0, 0.0, 0.0))
+    shapes = tuple(replace(s, material=2, media=(0, -1)) if s.name == "ship" else s for s in scene.shapes)
+    media = (medium,)
+    return replace(
+        scene, shapes=shapes, materials=(*scene.materials, null), lights=(*scene.lights, *lights), media=media
+    )
+
+
+def _run(tasks):
+    return [task() for task in tasks]
+
+
+@pytest.mark.parametrize("name", STAGES)
+def test_power_in_the_volume_map_is_the_same_and_better_known(name):
+    """z-test of the power that photons scatter in the fog after a bounce, and how much less it varies but for a flame
+    in it, whose photons are where they always were; the energy balances."""
+    *of, modes = STAGES[name]
+    flat = flatten(foggy(*of))
+    made = projection_of(flat, confined=False)
+    assert {m.light: m.mode for m in made.surfaces} == modes
+    assert {m.light: m.mode for m in made.caustic} == modes
+    sums, squares, counts, energy = [], [], [], []
+    for projection, seed in ((None, 1), (made, 2)):
+        settings = Photons(q=1.0, sequence="independent")
+        maps = trace_pass(flat, settings, seed, 0, 1_000_000, False, _run, projection=projection)
+        stored = unpack(maps.volume, maps.volume_unit)
+        outside = np.array([name != "flame" for name in flat.light_names])[stored["light"]]
+        power = stored["Phi"][outside].astype(float) @ LUMINANCE
+        sums.append(power.sum())
+        squares.append((power**2).sum())
+        counts.append(len(power))
+        energy.append(maps.energy)
+    z = (sums[0] - sums[1]) / math.sqrt(6 * sum(squares))  # a photon is stored a few times on its way
+    saved = squares[0] / squares[1]
+    print(f"{sums[0]:.4f} and {sums[1]:.4f} W of {counts} photons, z {z:+.2f}, {saved:.0f} times less variance")
+    assert abs(z) < 4
+    assert saved > 10
+    assert energy[1][0] == pytest.approx(flat.total_luminance, rel=1e-6)
+    assert energy[1][1:].sum() == pytest.approx(energy[1][0], rel=1e-5)
+    np.testing.assert_allclose(energy[0], energy[1], rtol=0.05, atol=0.01 * flat.total_luminance)
+
+
+def test_photons_are_never_confined_where_media_scatter():
+    """Surfaces are what maps know of; a room full of fog has none, whatever is asked for."""
+    for wanted in ("auto", "on"):
+        settings = settings_of(photons={"projection": wanted})
+        made = projection_for(open_scene(foggy(("dome",), (), FOG)), settings)
+        assert made is not None
+        assert {m.mode for m in made.surfaces} == {"cones"}
+        box = cornell_box()
+        camera = replace(box.camera, medium=0)
+        assert projection_for(open_scene(replace(box, camera=camera, media=(FOG,))), settings) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", STAGES)
+def test_all_methods_show_the_same_fog(name):
+    means = means_by_method(foggy(*STAGES[name][:3]), 1024)
+    assert means["progressive"] == pytest.approx(means["path"], rel=0.02)
+    assert means["gather"] == pytest.approx(means["path"], rel=0.02)
