@@ -24,6 +24,6 @@ def projection_for(scene: OpenScene, settings: Settings) -> Projection | None:
     if key not in scene.projections:
         confined = not scene.traits.lit_media
         made = projection_of(scene.flat, wanted == "on", traced > filling, confined)
-        useful = made.surface_power > 0 and (wanted == "on" and confined or made.spares)  # else none would start at all
+        useful = made.surface_power > 0 and (made.spares or (wanted == "on" and confined))  # else no photon would start
         scene.projections[key] = made if useful else None
     return scene.projections[key]

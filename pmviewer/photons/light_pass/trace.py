@@ -22,12 +22,9 @@ from pmviewer.kernels.bsdf.scattering import (
     STORED,
     attenuation,
     bsdf_at,
-    bsdf_sample,
     is_delta,
     keeps,
     pick_group,
-    same_side,
-    shading_normal,
 )
 from pmviewer.kernels.bsdf.thin_glass import is_ignored, keeps_class
 from pmviewer.kernels.compile.jit import inlined, kernel
@@ -47,8 +44,8 @@ from pmviewer.kernels.media.medium import has_media, light_medium
 from pmviewer.kernels.memory import row_of
 from pmviewer.kernels.random import draw1, draw4, hash3
 from pmviewer.kernels.scene import material_of
-from pmviewer.kernels.surface import STRAIGHT, adjoint_cosines, face, leave, surface_at
-from pmviewer.kernels.vector import dot, is_good, largest, luminance, mul, scale
+from pmviewer.kernels.surface import face, leave, surface_at
+from pmviewer.kernels.vector import is_good, largest, luminance, mul, scale
 from pmviewer.maps.photon_words import encode_direction
 from pmviewer.maps.record import BOUNCES, CAUSTIC, HAD_DIFFUSE, INDIRECT_CAUSTIC, LAST_SPECULAR, UNFOUND
 from pmviewer.photons.emission.window import most_pieces, pieces
@@ -67,7 +64,8 @@ from pmviewer.photons.light_pass.ledger import (
     E_TERMINATED,
 )
 from pmviewer.photons.light_pass.paths import begin_path, extend_path
-from pmviewer.photons.light_pass.roulette import BY_LUMINANCE, EQUAL, MOST_COPIES, copies, survival_probability
+from pmviewer.photons.light_pass.roulette import EQUAL, MOST_COPIES, copies, survival_probability
+from pmviewer.photons.light_pass.scatter import scattered
 from pmviewer.photons.projection.projected import emission
 
 _f4 = np.float32
@@ -196,7 +194,6 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
                     if left > 0:
                         factor, counts[C_PIECES] = factor / _f4(left + _i8(1)), counts[C_PIECES] + left
                         split = photon, factor, deltas
-                whole = factor
                 if b.groups == NOTHING:  # a part of a blend that others keep photons for
                     ledgers[kind, E_ABSORBED] += _f8(before * factor)
                     break
@@ -205,7 +202,7 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
                 if group != FOLLOWED and not to_global and pass_.only_direct != 0:
                     ledgers[kind, E_TERMINATED] += _f8(before * factor)
                     break
-                d, weight = _scattered(scene, b, group, wi, ng, u_lobe, (u0, u1))
+                d, weight, part = scattered(scene, projections[kind], b, group, p, wi, ng, u_lobe, (u0, u1), factor)
                 flags = _flags_after(scene, group, prim, material, ng, d, flags)
                 after = scale(mul(beta, weight), share)
                 good, survival = is_good(after), survival_probability(pass_.roulette, before, beta, after)
@@ -214,8 +211,9 @@ def trace_photons(scenes, passes, projections, i0, i1, out, paths):
                     ledgers[kind, E_ABSORBED if good else E_DROPPED] += _f8(before * factor)
                     break
                 beta = scale(after, _f4(1.0) / survival)
-                if pass_.roulette != BY_LUMINANCE or not survival < _f4(1.0):  # else it stays
-                    ledgers[kind, E_ABSORBED] += _f8(before * factor) - _f8(luminance(beta) * factor)
+                ledgers[kind, E_ABSORBED] += _f8(before * factor) - _f8(luminance(beta) * (factor * part))
+                whole = factor = factor * part
+                of = Trajectory(i, seed, index, light, factor, to_global)
                 wave, beta = _split(scene, b, wave, d, beta, factor, ledgers, kind)
                 bounces += 1
                 if bounces >= pass_.max_bounces:
@@ -413,14 +411,3 @@ def _flags_after(scene, group, prim, material, ng, d, flags):
     if keeps_class(scene, prim, material, ng, d):
         return flags
     return _u4(flags | _u4(LAST_SPECULAR))
-
-
-@inlined
-def _scattered(scene, b, group, wi, ng, u_lobe, u):
-    """A direction in which a group of lobes scatters, and the weight of the power that goes there."""
-    d, weight, _, _ = bsdf_sample(scene, b, group, wi, u_lobe, u[0], u[1])
-    if same_side(b, group, ng, wi, d) == 0:  # the lobe of a shading normal may dip below the surface
-        weight = (_f4(0.0), _f4(0.0), _f4(0.0))
-    elif abs(dot(shading_normal(b), ng)) < STRAIGHT:
-        weight = scale(weight, adjoint_cosines(shading_normal(b), ng, wi, d))
-    return d, weight

@@ -31,22 +31,52 @@ _NEAR = _f4(1.0 - EVERYWHERE)
 
 
 @device
+def cones_from(projection, p):
+    """Of the cones from the place p: the unit direction that they are around, the squared distance to the middle, and
+    how many there are, 0 within the innermost ball."""
+    away = sub((projection.small_x, projection.small_y, projection.small_z), p)
+    distance2, reach = dot(away, away), projection.small_radius
+    cones = _i8(0)
+    while reach * reach < distance2:
+        reach *= _f4(2.0)
+        cones += _i8(1)
+    if cones == 0:
+        return away, distance2, cones
+    return scale(away, _f4(1.0) / _f4(math.sqrt(distance2))), distance2, cones
+
+
+@device
+def direction_in_cones(projection, axis, distance2, cones, u, v):
+    """A direction in one of these cones, all of which get as many."""
+    u *= _f4(cones)
+    k = min(_i8(u), cones - _i8(1))
+    r_k = projection.small_radius * _f4(_i8(1) << k)
+    local = square_to_cone(min(u - _f4(k), _f4(1.0)), v, _narrow(r_k * r_k / distance2))
+    return from_basis(axis, local[0], local[1], local[2])
+
+
+@device
+def density_in_cones(projection, axis, distance2, cones, d):
+    """That of these directions at d, per solid angle."""
+    off = sub(d, axis)
+    apart = _f4(0.5) * dot(off, off)  # 1 − cosine, which 1 − dot would round
+    m, sin2 = _f4(0.0), projection.small_radius * projection.small_radius / distance2
+    for _ in range(cones):
+        one_minus_cos = _narrow(sin2)
+        if apart <= one_minus_cos:
+            m += _f4(1.0) / one_minus_cos
+        sin2 *= _f4(4.0)
+    return m * _f4(0.5 / math.pi) / _f4(cones)
+
+
+@device
 def start_in_cones(scene, projection, light, position, direction):
     """Origin, unit direction and power of a photon of an area light or a point, and the factor for its power: 0 where
     the light does not shine."""
     point = np.int32(light_number(scene, light, L_KIND)) == POINT
     p, n, front, gap, beta = light_start(scene, light, position)
-    away = sub((projection.small_x, projection.small_y, projection.small_z), p)
-    distance2, r = dot(away, away), projection.small_radius
-    cones = _i8(0)
-    reach = r
-    while reach * reach < distance2:
-        reach *= _f4(2.0)
-        cones += _i8(1)
+    axis, distance2, cones = cones_from(projection, p)
     u, v = direction
-    axis = n
-    if cones > 0:
-        axis = scale(away, _f4(1.0) / _f4(math.sqrt(distance2)))
     if cones == 0 or u < _EVERYWHERE:
         if cones > 0:
             u /= _EVERYWHERE
@@ -54,24 +84,13 @@ def start_in_cones(scene, projection, light, position, direction):
         if cones == 0:
             return leave(p, n, gap, d[0], d[1], d[2]), d, beta, _f4(1.0)
     else:
-        u = (u - _EVERYWHERE) / _NEAR * _f4(cones)
-        k = min(_i8(u), cones - _i8(1))
-        r_k = r * _f4(_i8(1) << k)
-        local = square_to_cone(min(u - _f4(k), _f4(1.0)), v, _narrow(r_k * r_k / distance2))
-        d = from_basis(axis, local[0], local[1], local[2])
+        d = direction_in_cones(projection, axis, distance2, cones, (u - _EVERYWHERE) / _NEAR, v)
     cos = abs(dot(n, d))
     if not point and not (cos > _f4(0.0) and dot(front, d) > _f4(0.0)):
         return p, d, beta, _f4(0.0)
-    off = sub(d, axis)
-    apart = _f4(0.5) * dot(off, off)  # 1 − cosine, which 1 − dot would round
-    m = _f4(0.0)
-    sin2 = r * r / distance2
-    for _ in range(cones):
-        one_minus_cos = _narrow(sin2)
-        if apart <= one_minus_cos:
-            m += _f4(2.0) / one_minus_cos if point else _f4(0.5) / (one_minus_cos * cos)
-        sin2 *= _f4(4.0)
-    return leave(p, n, gap, d[0], d[1], d[2]), d, beta, _f4(1.0) / (_EVERYWHERE + _NEAR / _f4(cones) * m)
+    usual = _f4(0.25 / math.pi) if point else cos * _f4(1.0 / math.pi)
+    m = density_in_cones(projection, axis, distance2, cones, d) / usual
+    return leave(p, n, gap, d[0], d[1], d[2]), d, beta, _f4(1.0) / (_EVERYWHERE + _NEAR * m)
 
 
 @device

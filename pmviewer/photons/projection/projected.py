@@ -70,6 +70,7 @@ PROJECTION_DTYPE = np.dtype(
         ("small_z", "f4"),
         ("small_radius", "f4"),
         ("scales", "i8"),  # discs around it
+        ("most_factor", "f4"),  # of power that photons may have which aim at it from surfaces far away; 0: none does
     ],
     align=True,
 )

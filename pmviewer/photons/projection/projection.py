@@ -28,6 +28,8 @@ from pmviewer.scene.arrays.flatten import FlatScene
 from pmviewer.scene.description import LUMINANCE, DirectionalLight, Environment, PointLight, Shape
 
 Float = NDArray[np.float64]
+MOST_FACTOR = 16.0
+"""Of a photon's power, over what photons aimed at the small have, with which it aims there again from surfaces."""
 WORTHWHILE = 0.7
 """`auto` uses maps that cover less than this share of the power."""
 LEAST_GAIN = {SCALES: 8.0, CONES: 16.0}
@@ -116,6 +118,7 @@ def projection_of(
         if small is not None:
             record["small_x"], record["small_y"], record["small_z"] = small.center
             record["small_radius"], record["scales"] = small.radius, scales(small.radius, scene.radius)
+            record["most_factor"] = MOST_FACTOR * gains.max() if gains.max(initial=1.0) > 1 else 0.0
         charted.append((tuple(m for m, _ in maps), float(powers.sum()), float(covered.sum())))
     (surfaces, surface_power, covered), (caustic, caustic_power, _) = charted
     return Projection(records, tuple(arrays), surfaces, caustic, surface_power, caustic_power, covered, most_gain)
