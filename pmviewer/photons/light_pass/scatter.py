@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from pmviewer.kernels.bsdf.scattering import STORED, bsdf_f, bsdf_pdf, bsdf_sample, same_side, shading_normal
-from pmviewer.kernels.compile.jit import inlined
+from pmviewer.kernels.compile.jit import device, inlined
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.surface import STRAIGHT, adjoint_cosines
 from pmviewer.kernels.vector import dot, scale
@@ -29,55 +29,52 @@ _BELOW_ONE = _f4(0.99999994)
 _BLACK = (_f4(0.0), _f4(0.0), _f4(0.0))
 
 
-@specialised
+@inlined
 def scattered(scene, projection, b, group, p, wi, ng, u_lobe, u, factor):
     """A direction in which a group of lobes scatters at p, the weight of the power that goes there, and the factor for
     it that roulette does not see. `projection` as in `pmviewer.photons.projection.projected.emission`; `factor` is
     that of the photon until then."""
+    d, weight, part = _direction(scene, projection, b, group, p, wi, u_lobe, u, factor)
+    if same_side(b, group, ng, wi, d) == 0:  # the lobe of a shading normal may dip below the surface
+        weight = (_f4(0.0), _f4(0.0), _f4(0.0))
+    elif abs(dot(shading_normal(b), ng)) < STRAIGHT:
+        weight = scale(weight, adjoint_cosines(shading_normal(b), ng, wi, d))
+    return d, weight, part
+
+
+@specialised
+def _direction(scene, projection, b, group, p, wi, u_lobe, u, factor):
+    """The same by shading normals alone."""
     if not has(projection, "most_factor"):
 
-        def by_lobes(scene, projection, b, group, p, wi, ng, u_lobe, u, factor):
-            d, weight, _ = _by_lobes(scene, b, group, wi, ng, u_lobe, u[0], u[1])
+        def by_lobes(scene, projection, b, group, p, wi, u_lobe, u, factor):
+            d, weight, _, _ = bsdf_sample(scene, b, group, wi, u_lobe, u[0], u[1])
             return d, weight, _f4(1.0)
 
         return by_lobes
     return _or_aimed
 
 
-def _or_aimed(scene, projection, b, group, p, wi, ng, u_lobe, u, factor):
-    axis, distance2, cones = p, _f4(0.0), 0
+def _or_aimed(scene, projection, b, group, p, wi, u_lobe, u, factor):
+    axis, distance2, cones, u0 = p, _f4(0.0), 0, u[0]
     if group == STORED and factor < projection.most_factor:
         axis, distance2, cones = cones_from(projection, p)
-    if cones < 2:
-        d, weight, _ = _by_lobes(scene, b, group, wi, ng, u_lobe, u[0], u[1])
-        return d, weight, _f4(1.0)
-    if u[0] < _AIMED:
-        d = direction_in_cones(projection, axis, distance2, cones, u[0] / _AIMED, u[1])
-        pdf = bsdf_pdf(b, group, wi, d)
-        if not pdf > _f4(0.0):
-            return d, _BLACK, _f4(1.0)
-        cos = abs(dot(shading_normal(b), d))
-        weight = _on_its_side(b, group, wi, ng, d, scale(bsdf_f(b, group, wi, d), cos / pdf))
+    if cones > 1 and u0 < _AIMED:
+        d = direction_in_cones(projection, axis, distance2, cones, u0 / _AIMED, u[1])
+        weight, pdf = _towards(b, group, wi, d)
     else:
-        u0 = min((u[0] - _AIMED) / _REST, _BELOW_ONE)
-        d, weight, pdf = _by_lobes(scene, b, group, wi, ng, u_lobe, u0, u[1])
-        if not pdf > _f4(0.0):
-            return d, weight, _f4(1.0) / _REST
+        if cones > 1:
+            u0 = min((u0 - _AIMED) / _REST, _BELOW_ONE)
+        d, weight, pdf, _ = bsdf_sample(scene, b, group, wi, u_lobe, u0, u[1])
+    if cones < 2 or not pdf > _f4(0.0):
+        return d, weight, _f4(1.0)
     return d, weight, pdf / (_REST * pdf + _AIMED * density_in_cones(projection, axis, distance2, cones, d))
 
 
-@inlined
-def _by_lobes(scene, b, group, wi, ng, u_lobe, u, v):
-    """A direction, the weight, and the density."""
-    d, weight, pdf, _ = bsdf_sample(scene, b, group, wi, u_lobe, u, v)
-    return d, _on_its_side(b, group, wi, ng, d, weight), pdf
-
-
-@inlined
-def _on_its_side(b, group, wi, ng, d, weight):
-    """The weight for photons; none where the lobe of a shading normal dips below the surface."""
-    if same_side(b, group, ng, wi, d) == 0:
-        return _BLACK
-    if abs(dot(shading_normal(b), ng)) < STRAIGHT:
-        return scale(weight, adjoint_cosines(shading_normal(b), ng, wi, d))
-    return weight
+@device
+def _towards(b, group, wi, d):
+    """Weight and density of a direction that the lobes did not choose."""
+    pdf = bsdf_pdf(b, group, wi, d)
+    if not pdf > _f4(0.0):
+        return (_f4(0.0), _f4(0.0), _f4(0.0)), _f4(0.0)
+    return scale(bsdf_f(b, group, wi, d), abs(dot(shading_normal(b), d)) / pdf), pdf
