@@ -21,6 +21,7 @@ from pmviewer.bench.agree.generate import (
     MEDIA,
     PROFILES,
     PROJECTED_FROM,
+    STAGED_FROM,
     needs_particles,
     scene_of,
 )
@@ -28,6 +29,7 @@ from pmviewer.bench.agree.media import has_media
 from pmviewer.bench.agree.tree import from_json, to_json, written_out
 from pmviewer.bench.agree.trial import HARMLESS
 from pmviewer.bench.agree.xml import number, scene_text, write_scene
+from pmviewer.photons.projection.projection import projection_of
 from pmviewer.scene.arrays.flatten import flatten
 from pmviewer.scene.description import ProjectorLight
 from pmviewer.scene.load import load_scene
@@ -205,6 +207,19 @@ def test_projectors_are_in_all_scenes_from_a_number_on_and_the_scenes_before_are
     assert len(alone) >= 10
     pictures = Counter(type(light["irradiance"]) for s in made for light in s["lights"] if light["type"] == "projector")
     assert min(pictures[dict], pictures[list]) >= 5
+
+
+def test_photons_aim_at_what_stands_on_wide_stages(tmp_path):
+    """Whatever is there, with media and without; files are read without a warning."""
+    aims = 0
+    for i in range(STAGED_FROM, STAGED_FROM + 26):
+        made = scene_of(3, i)
+        assert not needs_particles(made), i
+        scene = load_scene(write_scene(made, tmp_path, f"scene{i}")[0])
+        assert [w for w in scene.warnings if not any(h in w for h in HARMLESS)] == [], i
+        aims += projection_of(flatten(scene), confined=not has_media(made)).gain > 1
+    assert aims >= 20
+    assert sum(has_media(scene_of(3, i)) for i in range(STAGED_FROM, STAGED_FROM + 26)) == 2
 
 
 def test_scenes_with_projectors_are_read_without_a_warning_and_scale(tmp_path):

@@ -12,7 +12,7 @@ import numpy as np
 
 from pmviewer.bench import peer
 from pmviewer.bench.agree.features import GROUPS, features
-from pmviewer.bench.agree.generate import DENSE_FROM, GLOWING_FROM, PROJECTED_FROM, scene_of
+from pmviewer.bench.agree.generate import DENSE_FROM, GLOWING_FROM, PROJECTED_FROM, STAGED_FROM, scene_of
 from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.ours import METHODS, NEAREST_REACH, VIRTUAL
 from pmviewer.bench.agree.pooled import SURE, Pooled, farthest_off, pooled
@@ -28,8 +28,8 @@ from pmviewer.bench.report import BenchResult, Cell, Target
 from pmviewer.errors import PmviewerError, SettingError
 
 SCENES, QUICK_SCENES, SEED = 500, 12, 1
-EXTRA = ((12, GLOWING_FROM), (12, DENSE_FROM), (12, PROJECTED_FROM))
-"""How many scenes from which number on a whole run adds: media that emit, dense ones, and projectors."""
+EXTRA = ((9, GLOWING_FROM), (9, DENSE_FROM), (9, PROJECTED_FROM), (9, STAGED_FROM))
+"""How many scenes from which number on a whole run adds: media that emit, dense ones, projectors, and wide stages."""
 SHRINK_TRIES, MOST_SHRUNK = 120, 20
 OTHERS = ("estimation", *VIRTUAL)
 """Methods whose settings the notes tell."""

@@ -16,6 +16,7 @@ from pmviewer.bench.agree import lights, materials, media, shapes
 from pmviewer.bench.agree.draw import Draw
 from pmviewer.bench.agree.known import DEVIATIONS
 from pmviewer.bench.agree.materials import METALLIC, TRANSPARENT, Materials
+from pmviewer.bench.agree.stages import stage
 from pmviewer.bench.agree.tree import Node, bsdfs_of
 
 
@@ -70,7 +71,9 @@ GLOWING_FROM, GLOW_SEED = 10_000, 0x610
 DENSE_FROM, DENSE_SEED = 20_000, 0xDE5
 """From this number on to the next all scenes have dense media, which don't emit."""
 PROJECTED_FROM, PROJECTOR_SEED = 30_000, 0x9E0
-"""From this number on scenes follow the profiles again, and all have projectors."""
+"""From this number on to the next scenes follow the profiles again, and all have projectors."""
+STAGED_FROM, STAGE_SEED = 40_000, 0x57A6E
+"""From this number on they do so on wide stages, without projectors."""
 SCALES = (1e-3, 1e-2, 0.1, 10.0, 100.0, 1e3)
 HALF = 2.0
 """Half the edge of the ground, and of a room."""
@@ -100,9 +103,11 @@ def scene_of(seed: int, index: int) -> Node:
             media.thicken(Draw(seed + DENSE_SEED, index), scene)
         elif GLOWING_FROM <= index < DENSE_FROM:
             media.ignite(Draw(seed + GLOW_SEED, index), scene)
-    if index >= PROJECTED_FROM:
+    if index >= STAGED_FROM:
+        stage(Draw(seed + STAGE_SEED, index), scene, HALF)
+    elif index >= PROJECTED_FROM:
         lights.project(Draw(seed + PROJECTOR_SEED, index), scene)
-    scene["camera"] = _camera(draw, closed, scene)
+    scene["camera"] = _camera(draw, scene["closed"], scene)
     for deviation in DEVIATIONS:
         if deviation.rare and profile.name != "tilted normals" and draw.chance(0.85):
             scene = deviation.without(scene) or scene
