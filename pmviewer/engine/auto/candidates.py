@@ -43,6 +43,11 @@ class Candidate:
         return self.values.get("render.method") == "gather"
 
     @property
+    def by_nearest(self) -> bool:
+        """Whether look-ups reach to the nearest photons, however far these are."""
+        return self.values.get("estimate.lookup") == "nearest"
+
+    @property
     def overlooked(self) -> float:
         """What an error that a trial promises of its gather rays counts as, for bias that the trial may overlook: of
         records, and of look-ups near edges and behind thin walls."""
@@ -92,14 +97,21 @@ CACHE_CORNERS = Candidate("gather with irradiance cache and second gathers", {**
 wrong by 0.018 (squared, relative; 0.008 with usual ones), with second gathers by 0.0038, and 0.0011 with usual
 discs."""
 PATH = Candidate("path", {"render.method": "path"})
+NEAREST = {"estimate.lookup": "nearest"}
+"""Where photons aim at what is small on a stage they are a hundred times as dense there, and no radius suits both that
+and the rest, which rays meet, too. relMSE after 8 CPU s over that with one radius, four random stages: gather 6e-4,
+3e-3, 0.05 and 1.0, progressive 0.01, 0.06, 0.15 and 1.1; a teapot on a wide floor 1.0 and 0.9, a space ship under a
+dome 2.4 and 1.5 (files)."""
+NEAREST_NAME = "progressive, nearest photons"
+APART = "photons lie close at what is small and far apart elsewhere: look-ups reach to the nearest (estimate.lookup)"
 GUIDED = {"importance.map": "average", "importance.emission": "Christensen keep", **CHANNEL_ROULETTE}
 
 
 def candidates(
-    traits: SceneTraits, settings: Settings, seconds: float, apart: bool = False
+    traits: SceneTraits, settings: Settings, seconds: float, apart: bool = False, aims: bool = False
 ) -> tuple[list[Candidate], list[tuple[str, str]]]:
     """What is worth a trial in such a scene for so many CPU seconds, the default method first, and what isn't with the
-    reason. `settings` tell what automatic mode does not set; `apart`: by passes that can be rendered apart."""
+    reason. `settings` tell what automatic mode does not set; `apart`: by passes that can be rendered apart; `aims`: photons aim at what is small."""
     left_out: list[tuple[str, str]] = []
     glossy = settings.photons.glossy
     caustics, why = _caustics(traits, settings)
@@ -112,6 +124,9 @@ def candidates(
         gather = gather.having(CORNERS)
         gather, cache, corners = (way.having(caustics, *why) for way in (gather, cache, corners))
     found = [progressive, gather]
+    if aims:
+        gather, cache, corners = (way.having(NEAREST, APART) for way in (gather, cache, corners))
+        found = [progressive, replace(progressive.having(NEAREST, APART), name=NEAREST_NAME), gather]
     if traits.lit_media:
         left_out.append(("irradiance cache", "it does not know of media that scatter or emit light"))
     elif not traits.has_diffuse:

@@ -17,6 +17,7 @@ from pmviewer.engine.auto.trial import Tell, trial
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
+from pmviewer.engine.stages.projection import aims
 from pmviewer.render.adaptive import DECIDED_AFTER, WORTH
 from pmviewer.render.camera import resolve_camera
 from pmviewer.settings.access import SETTINGS, Settings, with_values
@@ -75,7 +76,7 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
     sets itself does not count. Raises Cancelled when the pool is cancelled."""
     base = with_values(settings, assignments({}))
     seconds = goal.seconds or USUAL
-    found, left_out = candidates(opened.traits, base, seconds, goal.apart)
+    found, left_out = candidates(opened.traits, base, seconds, goal.apart, aims(opened, base))
     said = [f"not tried: {what}, {why}" for what, why in left_out]
     camera = resolve_camera(opened.scene, base.camera)
     size = planned(SHARE * seconds, len(found), camera.width, camera.height)

@@ -142,7 +142,7 @@ class Trier:
     def spread(self, candidates: list[Candidate], seconds: float = 0.0) -> list[Candidate]:
         """The candidates, with wider look-ups where gather rays end if photons lie far apart for a picture of so many
         CPU seconds (`pmviewer.engine.auto.sparse`). The photons are those of the first pictures."""
-        first = next((c for c in candidates if c.gathers), None)
+        first = next((c for c in candidates if c.gathers and not c.by_nearest), None)
         if first is None:
             return candidates
         chosen = self.settings_of(first)
@@ -156,7 +156,7 @@ class Trier:
         wider = wider_by(places, chosen.photons.N, usual, seconds)
         if wider == 1.0:
             return candidates
-        return [self._with_wider(c, wider) if c.gathers else c for c in candidates]
+        return [self._with_wider(c, wider) if c.gathers and not c.by_nearest else c for c in candidates]
 
     def _with_wider(self, candidate: Candidate, wider: float) -> Candidate:
         chosen = self.settings_of(candidate)
@@ -187,14 +187,14 @@ class Trier:
         runs = [Run(with_values(small, {"photons.N": count})) for count in counts]
         found = Attempt(candidate, plan, first, runs)
         there = replace(first, usual=first.global_)  # media in the small pictures go with that, as a number
-        if plan.shown_directly:
+        if plan.shown_directly and not candidate.by_nearest:
             found.shown = [Run(with_values(small, w.values(small, there))) for w in _either("shown")]
         if plan.direct and not plan.gather:  # beside a gather they are the same
             fewest = found.runs[-1].settings
             found.direct = [Run(with_values(fewest, {"direct.samples": MORE * plan.light_samples}))]
-        if plan.caustic_mask and not plan.gather:  # beside a gather they are the same
+        if plan.caustic_mask and not plan.gather and not candidate.by_nearest:  # beside a gather they are the same
             found.caustic = [Run(with_values(small, w.values(small, there))) for w in _either("caustic")]
-        if candidate.is_like(GATHER):  # the others have about the same
+        if candidate.is_like(GATHER) and not candidate.by_nearest:  # the others have about the same
             found.gathered = [Run(with_values(small, Widths(shown=WIDER).values(small, there)))]
         return found
 

@@ -78,14 +78,15 @@ def trial(
     pictures = [np.mean(images, axis=0) for images in zip(*(run.images for t in every for run in t.runs), strict=True)]
     mean, square = np.mean(pictures, axis=0), shown_squared(pictures)
     gathers = next((tried for tried in every if tried.candidate.is_like(GATHER)), None)
-    at_ends = _at_ends(gathers, mean) if gathers is not None else Blur()
+    at_ends = _at_ends(gathers, mean) if gathers is not None and gathers.gathered else Blur()
     with_samples = next((tried for tried in every if tried.direct), None)
     with_caustics = next((tried for tried in every if tried.caustic), None)
     for tried in every:
         interpolated = 0.0
         if tried.plan.cache and gathers is not None:
             interpolated = squared(tried.runs[0].images, gathers.runs[0].images, mean, BLOCK)
-        source = tried if tried.caustic or not tried.plan.caustic_mask else with_caustics
+        by_radius = tried.plan.caustic_mask and not tried.candidate.by_nearest
+        source = tried if tried.caustic or not by_radius else with_caustics
         caustic = _widened(source, "caustic", square, trier.scale, 0.0) if source is not None else NONE
         if source is not None:
             caustic = caustic.wider(tried.first.caustic / source.first.caustic)

@@ -27,3 +27,9 @@ def projection_for(scene: OpenScene, settings: Settings) -> Projection | None:
         useful = made.surface_power > 0 and (made.spares or (wanted == "on" and confined))  # else no photon would start
         scene.projections[key] = made if useful else None
     return scene.projections[key]
+
+
+def aims(scene: OpenScene, settings: Settings) -> bool:
+    """Whether photons aim at what is small on a stage."""
+    made = projection_for(scene, settings)
+    return made is not None and made.gain > 1.0
