@@ -16,6 +16,7 @@ from pmviewer.engine.auto.candidates import (
     CORNERS,
     GATHER,
     LIGHTS_CAUSTICS,
+    NEAREST_NAME,
     PATH,
     PROGRESSIVE,
     SHOWN,
@@ -35,9 +36,12 @@ from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
 from pmviewer.maps.radius import progressive_radius
 from pmviewer.scene.analysis import SceneTraits
+from pmviewer.scene.description import Shape, Sphere
 from pmviewer.settings.access import SETTINGS, Settings, flat, with_values
 from pmviewer.settings.presets import assignments, given
 from pmviewer.state import State
+from tests.photons.test_cones import stage
+from tests.support.scenes import MIRROR, diffuse
 
 RADII = FirstRadii(0.02, 0.02, 0.01)
 
@@ -56,6 +60,39 @@ def test_what_traits_rule_out_is_not_tried():
     for lit in ({"has_scattering": True}, {"media_emit": True}):
         assert not {CACHE.name, CACHE_CORNERS.name} & set(names(replace(PLAIN, has_media=True, **lit)))
     assert names(replace(PLAIN, has_diffuse=False)) == [PROGRESSIVE.name, PATH.name]
+
+
+def test_gathers_look_up_the_nearest_photons_where_photons_aim():
+    """Progressive as well, beside the default, which comes first."""
+    found = candidates(PLAIN, Settings(), 10.0, aims=True)[0]
+    assert [c.name for c in found] == [
+        PROGRESSIVE.name, NEAREST_NAME, GATHER.name, CACHE.name, CACHE_CORNERS.name, PATH.name
+    ]  # fmt: skip
+    assert [c.name for c in found if not c.by_nearest] == [PROGRESSIVE.name, PATH.name]
+    assert all(any("estimate.lookup" in said for said in c.said) for c in found if c.by_nearest)
+    assert not any(c.by_nearest for c in candidates(PLAIN, Settings(), 10.0)[0])
+
+
+@pytest.mark.slow
+def test_one_radius_does_not_suit_a_wide_stage(pool):
+    """A ball and a mirror under a dome that reflects half, on a floor whose photons lie far apart: what is chosen has a
+    tenth of the noise of indirect light that it has with one radius."""
+    scene = stage("dome", more=(Shape("mirror", Sphere((3.6, 0.4, 2.5), 0.4), 2),), size=48)
+    opened = open_scene(replace(scene, materials=(scene.materials[0], diffuse("dome"), MIRROR)))
+    chosen = choose(opened, Settings(), Goal(seconds=8.0), pool, lambda text, share: None)
+    assert chosen.trial.measured
+    assert chosen.values["estimate.lookup"] == "nearest", chosen.sentences
+    noise = []
+    for lookup in ("nearest", "radius"):
+        pictures = []
+        for seed in (1, 2):
+            values = {**chosen.values, "estimate.lookup": lookup, "render.seed": seed}
+            renderer = Renderer(opened, with_values(Settings(), values), pool, StageStore(1 << 28))
+            renderer.step()
+            pictures.append(renderer.frame(0).image("indirect").astype(float))
+        noise.append(((pictures[0] - pictures[1]) ** 2).mean() / 2)
+    print(f"{chosen.name}: noise of a pass {noise[0]:.3g}, by one radius {noise[1]:.3g}")
+    assert noise[0] < 0.1 * noise[1]
 
 
 @pytest.mark.parametrize(("less", "chosen"), [(0.8, 150_000), (0.75, 50_000)])

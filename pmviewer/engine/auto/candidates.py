@@ -111,7 +111,8 @@ def candidates(
     traits: SceneTraits, settings: Settings, seconds: float, apart: bool = False, aims: bool = False
 ) -> tuple[list[Candidate], list[tuple[str, str]]]:
     """What is worth a trial in such a scene for so many CPU seconds, the default method first, and what isn't with the
-    reason. `settings` tell what automatic mode does not set; `apart`: by passes that can be rendered apart; `aims`: photons aim at what is small."""
+    reason. `settings` tell what automatic mode does not set; `apart`: by passes that can be rendered apart; `aims`:
+    photons aim at what is small on a stage."""
     left_out: list[tuple[str, str]] = []
     glossy = settings.photons.glossy
     caustics, why = _caustics(traits, settings)
