@@ -73,7 +73,7 @@ def test_gathers_look_up_the_nearest_photons_where_photons_aim():
     assert not any(c.by_nearest for c in candidates(PLAIN, Settings(), 10.0)[0])
 
 
-@pytest.mark.slow
+@pytest.mark.extensive
 def test_one_radius_does_not_suit_a_wide_stage(pool):
     """A ball and a mirror under a dome that reflects half, on a floor whose photons lie far apart: what is chosen has a
     tenth of the noise of indirect light that it has with one radius."""
