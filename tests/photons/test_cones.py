@@ -29,6 +29,7 @@ from pmviewer.scene.description import (
     Sphere,
 )
 from pmviewer.settings.access import Photons
+from tests.support.denser import at_once, same_power_less_variance
 from tests.support.scenes import ball_mesh, box_walls, cube_mesh, diffuse, means_by_method
 
 pytestmark = pytest.mark.usefixtures("every_surface")
@@ -183,34 +184,18 @@ def test_a_lamp_that_shines_elsewhere_aims_at_nothing():
     assert gain_of(Sphere(SHIP.center, 0.5), None, SMALL) == 1.0
 
 
-def _run(tasks):
-    return [task() for task in tasks]
-
-
 @pytest.mark.parametrize("lamps", [("dome",), ("dome", "point"), ("panel", "tube")], ids="+".join)
 def test_power_of_the_maps_is_the_same_and_better_known(lamps):
     """z-test of the power that photons bring the ship from the lamps, and how much less it varies; the energy
     balances."""
     flat = flatten(stage(*lamps))
-    sums, squares, counts, energy = [], [], [], []
-    for projection, seed in ((None, 1), (projection_of(flat), 2)):
-        settings = Photons(q=1.0, sequence="independent")
-        maps = trace_pass(flat, settings, seed, 0, 1_000_000, False, _run, projection=projection)
+
+    def power_of(maps):
         stored = unpack(maps.global_, maps.global_unit)
         near = (np.linalg.norm(stored["position"] - SMALL.center, axis=1) < 0.81) & (stored["path_class"] == DIRECT)
-        power = stored["Phi"][near].astype(float) @ LUMINANCE
-        sums.append(power.sum())
-        squares.append((power**2).sum())
-        counts.append(near.sum())
-        energy.append(maps.energy)
-    z = (sums[0] - sums[1]) / math.sqrt(3 * sum(squares))
-    saved = squares[0] / squares[1]
-    print(f"{sums[0]:.4f} and {sums[1]:.4f} W of {counts} photons, z {z:+.2f}, {saved:.0f} times less variance")
-    assert abs(z) < 4
-    assert saved > 15
-    assert energy[1][0] == pytest.approx(flat.total_luminance, rel=1e-6)
-    assert energy[1][1:].sum() == pytest.approx(energy[1][0], rel=1e-5)
-    np.testing.assert_allclose(energy[0], energy[1], rtol=0.05, atol=0.01 * flat.total_luminance)
+        return stored["Phi"][near].astype(float) @ LUMINANCE
+
+    same_power_less_variance(flat, projection_of(flat), power_of, stored=3, times=15)
 
 
 def test_a_dome_ten_million_times_as_large():
@@ -240,7 +225,7 @@ def test_lamps_whose_light_is_wasted_get_no_more_photons_than_they_bring():
     panel = Parallelogram((0.5, 4.0, -0.5), (3.0, 0.0, 0.0), (0.0, 0.0, 3.0))
     scene = stage("dome", more=(Shape("panel", panel, 0, (8.0, 8.0, 8.0)),))
     flat = flatten(scene)
-    maps = trace_pass(flat, Photons(q=1.0), 3, 0, 200_000, False, _run, projection=projection_of(flat))
+    maps = trace_pass(flat, Photons(q=1.0), 3, 0, 200_000, False, at_once, projection=projection_of(flat))
     stored = unpack(maps.global_, maps.global_unit)
     near = (np.linalg.norm(stored["position"] - SMALL.center, axis=1) < 0.81) & (stored["path_class"] == DIRECT)
     power = stored["Phi"][near].astype(float) @ LUMINANCE

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,12 +10,11 @@ import pytest
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.stages.projection import projection_for
 from pmviewer.maps.record import unpack
-from pmviewer.photons.light_pass.light_pass import trace_pass
 from pmviewer.photons.projection.projection import projection_of
 from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
 from pmviewer.scene.description import ConstantEnvironment, Material, Medium
-from pmviewer.settings.access import Photons
 from tests.photons.test_cones import stage
+from tests.support.denser import same_power_less_variance
 from tests.support.scenes import cornell_box, rendered, settings_of
 
 pytestmark = pytest.mark.usefixtures("any_light_in_media")
@@ -42,10 +40,6 @@ def foggy(lamps, lights, medium):
     )
 
 
-def _run(tasks):
-    return [task() for task in tasks]
-
-
 @pytest.mark.parametrize("name", STAGES)
 def test_power_in_the_volume_map_is_the_same_and_better_known(name):
     """z-test of the power that photons scatter in the fog after a bounce, and how much less it varies but for a flame
@@ -55,25 +49,13 @@ def test_power_in_the_volume_map_is_the_same_and_better_known(name):
     made = projection_of(flat, confined=False)
     assert {m.light: m.mode for m in made.surfaces} == modes
     assert {m.light: m.mode for m in made.caustic} == modes
-    sums, squares, counts, energy = [], [], [], []
-    for projection, seed in ((None, 1), (made, 2)):
-        settings = Photons(q=1.0, sequence="independent")
-        maps = trace_pass(flat, settings, seed, 0, 1_000_000, False, _run, projection=projection)
+    outside = np.array([light != "flame" for light in flat.light_names])
+
+    def power_of(maps):
         stored = unpack(maps.volume, maps.volume_unit)
-        outside = np.array([name != "flame" for name in flat.light_names])[stored["light"]]
-        power = stored["Phi"][outside].astype(float) @ LUMINANCE
-        sums.append(power.sum())
-        squares.append((power**2).sum())
-        counts.append(len(power))
-        energy.append(maps.energy)
-    z = (sums[0] - sums[1]) / math.sqrt(6 * sum(squares))  # a photon is stored a few times on its way
-    saved = squares[0] / squares[1]
-    print(f"{sums[0]:.4f} and {sums[1]:.4f} W of {counts} photons, z {z:+.2f}, {saved:.0f} times less variance")
-    assert abs(z) < 4
-    assert saved > 10
-    assert energy[1][0] == pytest.approx(flat.total_luminance, rel=1e-6)
-    assert energy[1][1:].sum() == pytest.approx(energy[1][0], rel=1e-5)
-    np.testing.assert_allclose(energy[0], energy[1], rtol=0.05, atol=0.01 * flat.total_luminance)
+        return stored["Phi"][outside[stored["light"]]].astype(float) @ LUMINANCE
+
+    same_power_less_variance(flat, made, power_of, stored=6, times=10)
 
 
 def test_photons_are_never_confined_where_media_scatter():

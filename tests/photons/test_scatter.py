@@ -17,6 +17,7 @@ from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
 from pmviewer.scene.description import Material, Mesh, Sphere
 from pmviewer.settings.access import Photons
 from tests.photons.test_cones import FLOOR, stage
+from tests.support.denser import at_once
 from tests.support.scenes import diffuse
 
 pytestmark = pytest.mark.usefixtures("every_surface")
@@ -46,7 +47,7 @@ def large(*lamps, floor=FLOOR, material=None):
 def arrived(flat, projection, seed, N=1_000_000, **settings):
     """Luminance (n,) of photons that arrive at the ball over other surfaces, and the pass."""
     given = Photons(q=1.0, sequence="independent", glossy=0.1, **settings)
-    maps = trace_pass(flat, given, seed, 0, N, False, lambda tasks: [t() for t in tasks], projection=projection)
+    maps = trace_pass(flat, given, seed, 0, N, False, at_once, projection=projection)
     stored = unpack(maps.global_, maps.global_unit)
     away = np.linalg.norm(stored["position"] - BALL.center, axis=1)
     near = (away < BALL.radius + 0.01) & (stored["path_class"] != DIRECT)

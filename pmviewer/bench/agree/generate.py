@@ -92,6 +92,7 @@ def scene_of(seed: int, index: int) -> Node:
     scene: Node = {"profile": profile.name, "scale": draw.pick(SCALES) if draw.chance(0.35) else 1.0, "groups": {}}
     scene |= {"closed": closed, "nested": False}
     scene["shapes"] = _surroundings(draw, made, profile, closed)
+    surroundings = len(scene["shapes"])
     _fill(draw, made, profile, scene)
     scene["lights"] = []
     _light(draw, made, profile, closed, scene)
@@ -104,7 +105,7 @@ def scene_of(seed: int, index: int) -> Node:
         elif GLOWING_FROM <= index < DENSE_FROM:
             media.ignite(Draw(seed + GLOW_SEED, index), scene)
     if index >= STAGED_FROM:
-        stage(Draw(seed + STAGE_SEED, index), scene, HALF)
+        stage(Draw(seed + STAGE_SEED, index), scene, surroundings, HALF)
     elif index >= PROJECTED_FROM:
         lights.project(Draw(seed + PROJECTOR_SEED, index), scene)
     scene["camera"] = _camera(draw, scene["closed"], scene)

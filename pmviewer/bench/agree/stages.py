@@ -11,11 +11,10 @@ FARTHEST = 5e3
 """Most width of the floor, in the scene's own units: Mitsuba's cameras see 10,000 far."""
 
 
-def stage(draw: Draw, scene: Node, half: float) -> None:
-    """Replace the scene's surroundings, whose halved edge is `half`, and its lights of one point or direction, whose
-    caustics a path tracer does not find."""
-    around = [s for s in scene["shapes"] if s["to_world"] and s["to_world"][0][0] == "scale" and _edge(s) == half]
-    objects = [s for s in scene["shapes"] if s not in around]
+def stage(draw: Draw, scene: Node, surroundings: int, half: float) -> None:
+    """Replace so many surroundings, which are the scene's first shapes and whose halved edge is `half`, and leave out
+    lights of one point or direction, whose caustics a path tracer does not find."""
+    around, objects = scene["shapes"][:surroundings], scene["shapes"][surroundings:]
     grey = {"type": "twosided", "inside": {"type": "diffuse", "reflectance": draw.colour(0.2, 0.8)}}
     wide = half * draw.log(8.0, 100.0)
     floor = {"type": "rectangle", "to_world": [["scale", [wide, wide, 1.0]]]}
@@ -38,7 +37,3 @@ def stage(draw: Draw, scene: Node, half: float) -> None:
     scene["closed"] = False
     if wide * scene["scale"] > FARTHEST:
         scene["scale"] = 1.0
-
-
-def _edge(shape: Node) -> float:
-    return float(shape["to_world"][0][1][0])

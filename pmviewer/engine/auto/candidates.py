@@ -103,7 +103,9 @@ and the rest, which rays meet, too. relMSE after 8 CPU s over that with one radi
 3e-3, 0.05 and 1.0, progressive 0.01, 0.06, 0.15 and 1.1; a teapot on a wide floor 1.0 and 0.9, a space ship under a
 dome 2.4 and 1.5 (files)."""
 NEAREST_NAME = "progressive, nearest photons"
-APART = "photons lie close at what is small and far apart elsewhere: look-ups reach to the nearest (estimate.lookup)"
+WHY_NEAREST = (
+    "photons lie close at what is small and far apart elsewhere: look-ups reach to the nearest (estimate.lookup)"
+)
 GUIDED = {"importance.map": "average", "importance.emission": "Christensen keep", **CHANNEL_ROULETTE}
 
 
@@ -126,8 +128,8 @@ def candidates(
         gather, cache, corners = (way.having(caustics, *why) for way in (gather, cache, corners))
     found = [progressive, gather]
     if aims:
-        gather, cache, corners = (way.having(NEAREST, APART) for way in (gather, cache, corners))
-        found = [progressive, replace(progressive.having(NEAREST, APART), name=NEAREST_NAME), gather]
+        gather, cache, corners = (way.having(NEAREST, WHY_NEAREST) for way in (gather, cache, corners))
+        found = [progressive, replace(progressive.having(NEAREST, WHY_NEAREST), name=NEAREST_NAME), gather]
     if traits.lit_media:
         left_out.append(("irradiance cache", "it does not know of media that scatter or emit light"))
     elif not traits.has_diffuse:

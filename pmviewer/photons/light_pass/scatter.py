@@ -36,7 +36,7 @@ def scattered(scene, projection, b, group, p, wi, ng, u_lobe, u, factor):
     that of the photon until then."""
     d, weight, part = _direction(scene, projection, b, group, p, wi, u_lobe, u, factor)
     if same_side(b, group, ng, wi, d) == 0:  # the lobe of a shading normal may dip below the surface
-        weight = (_f4(0.0), _f4(0.0), _f4(0.0))
+        weight = _BLACK
     elif abs(dot(shading_normal(b), ng)) < STRAIGHT:
         weight = scale(weight, adjoint_cosines(shading_normal(b), ng, wi, d))
     return d, weight, part
@@ -76,5 +76,5 @@ def _towards(b, group, wi, d):
     """Weight and density of a direction that the lobes did not choose."""
     pdf = bsdf_pdf(b, group, wi, d)
     if not pdf > _f4(0.0):
-        return (_f4(0.0), _f4(0.0), _f4(0.0)), _f4(0.0)
+        return _BLACK, _f4(0.0)
     return scale(bsdf_f(b, group, wi, d), abs(dot(shading_normal(b), d)) / pdf), pdf
