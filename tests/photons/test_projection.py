@@ -173,7 +173,7 @@ def test_auto_leaves_closed_rooms_alone():
 
 def test_mesh_spheres_cover_the_mesh():
     mesh = ball_mesh(0.7, 4)
-    spheres = spheres_of(replace(light_scene(), shapes=(Shape("mesh", mesh, 0),)))
+    spheres = spheres_of(replace(light_scene(), shapes=(Shape("mesh", mesh, 0),))).around
     assert MOST_SPHERES <= len(spheres) < 2 * MOST_SPHERES
     weights = np.random.default_rng(1).dirichlet((1, 1, 1), len(mesh.faces))
     points = (mesh.vertices[mesh.faces] * weights[:, :, None]).sum(1)
@@ -230,7 +230,7 @@ def test_spheres_cover_other_shapes_closely(kind):
     u, v = np.random.default_rng(2).random((2, 20_000))
     v[:4000], u[4000:8000] = np.round(v[:4000]), np.round(u[4000:8000])
     geometry, points = round_points(kind, u, v)
-    spheres = spheres_of(replace(light_scene(), shapes=(Shape(kind, geometry, 0),)))
+    spheres = spheres_of(replace(light_scene(), shapes=(Shape(kind, geometry, 0),))).around
     gap = np.linalg.norm(points[:, None] - spheres[None, :, :3], axis=2) - spheres[None, :, 3]
     assert gap.min(axis=1).max() <= 1e-9
     size = np.linalg.norm(points - points.mean(axis=0), axis=1).max()

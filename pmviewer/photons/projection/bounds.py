@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,32 +15,42 @@ from pmviewer.scene.description import Cylinder, Disk, Geometry, Mesh, Parallelo
 Float = NDArray[np.float64]
 MOST_SPHERES = 256
 """A mesh of more triangles is cut into so many clusters."""
+MOST_OF_MESHES = 8192
+"""Where there are many meshes, they share so many: in a room of 900 of them, all cut into 256 take 3.4 s."""
 PATCHES = 64
 """Of other surfaces than meshes and spheres."""
 
 
-def spheres_of(scene: Scene, caustic: bool = False) -> Float:
-    """(n, 4) centres and radii of spheres that cover the scene's surfaces, meshes by clusters of triangles.
+class Spheres(NamedTuple):
+    """`around` (n, 4): centres and radii; `caustic` (n,) bool: what is in there may make caustics."""
 
-    With `caustic` those that may make caustics: all that are not purely diffuse.
-    """
-
-    def counts(shape: Shape) -> bool:
-        return not caustic or scene.materials[shape.material].kind != "diffuse"
-
-    every = [_around(s.geometry) for s in scene.shapes if counts(s)]
-    shown = [i for i in scene.instances if any(counts(s) for s in i.group.shapes)]
-    if len(shown) > MOST_SPHERES:
-        every.append(_box(*instance_bounds(tuple(shown))))
-    else:
-        every += [_box(*instance_bounds((i,))) for i in shown]
-    return np.concatenate(every) if every else np.zeros((0, 4))
+    around: Float
+    caustic: NDArray[np.bool_]
 
 
-def _around(geometry: Geometry) -> Float:
-    """Spheres around one shape's surface, not around what it encloses: photons may start in there."""
+def spheres_of(scene: Scene) -> Spheres:
+    """Spheres that cover the scene's surfaces, meshes by clusters of triangles. All that are not purely diffuse may
+    make caustics."""
+
+    def caustic(shape: Shape) -> bool:
+        return scene.materials[shape.material].kind != "diffuse"
+
+    meshes = sum(isinstance(shape.geometry, Mesh) for shape in scene.shapes)
+    most = min(MOST_SPHERES, max(MOST_OF_MESHES // max(meshes, 1), 1))
+    every = [(_around(shape.geometry, most), caustic(shape)) for shape in scene.shapes]
+    for may in (False, True):
+        shown = [i for i in scene.instances if any(map(caustic, i.group.shapes)) == may]
+        boxes = [(i,) for i in shown] if len(shown) <= MOST_SPHERES else [tuple(shown)]
+        every += [(_box(*instance_bounds(box)), may) for box in boxes]
+    around = np.concatenate([np.zeros((0, 4)), *(spheres for spheres, _ in every)])
+    return Spheres(around, np.repeat([may for _, may in every], [len(spheres) for spheres, _ in every]).astype(bool))
+
+
+def _around(geometry: Geometry, most: int) -> Float:
+    """Spheres around one shape's surface, not around what it encloses: photons may start in there. About `most` of a
+    mesh."""
     if isinstance(geometry, Mesh):
-        return _mesh(geometry)
+        return _mesh(geometry, most)
     if isinstance(geometry, Parallelogram):
         return _plane(geometry)
     if isinstance(geometry, Cylinder):
@@ -98,25 +109,26 @@ def _box(low: Float, high: Float) -> Float:
     return np.array([[*(low + high) / 2, np.linalg.norm(high - low) / 2]])
 
 
-def _mesh(mesh: Mesh) -> Float:
-    corners = mesh.vertices[mesh.faces]
-    parts = [np.arange(len(corners))]
-    middles = corners.mean(axis=1)
-    while len(parts) < MOST_SPHERES and max(map(len, parts)) > 1:
+def _mesh(mesh: Mesh, most: int) -> Float:
+    vertices = np.ascontiguousarray(mesh.vertices.T, float)
+    middles = sum(np.take(vertices, mesh.faces[:, corner], axis=1) for corner in range(3)) / 3
+    parts = [np.arange(len(mesh.faces))]
+    while len(parts) < most and max(map(len, parts)) > 1:
         parts = [half for part in parts for half in _halves(middles, part)]
     spheres = []
     for part in parts:
-        points = corners[part].reshape(-1, 3)
-        center = (points.min(axis=0) + points.max(axis=0)) / 2
-        spheres.append([*center, np.linalg.norm(points - center, axis=1).max()])
+        points = np.take(vertices, mesh.faces[part].ravel(), axis=1)
+        center = (points.min(axis=1) + points.max(axis=1)) / 2
+        spheres.append([*center, math.sqrt(((points - center[:, None]) ** 2).sum(axis=0).max())])
     return np.array(spheres)
 
 
 def _halves(middles: Float, part: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """A cluster cut at the median of its longest axis."""
+    """A cluster cut at the median of its longest axis; `middles` (3, n)."""
     if len(part) < 2:
         return [part]
-    points = middles[part]
-    axis = int(np.argmax(points.max(axis=0) - points.min(axis=0)))
-    order = part[np.argsort(points[:, axis], kind="stable")]
-    return [order[: len(order) // 2], order[len(order) // 2 :]]
+    points = np.take(middles, part, axis=1)
+    axis = int(np.argmax(points.max(axis=1) - points.min(axis=1)))
+    half = len(part) // 2
+    order = part[np.argpartition(points[axis], half)]
+    return [order[:half], order[half:]]

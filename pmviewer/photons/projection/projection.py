@@ -87,8 +87,9 @@ def projection_of(
     small = small_of(scene.owner, scene.radius)
     if small is not None:
         small = small._replace(radius=max(small.radius, SMALLEST * scene.radius))
+    covering = spheres_of(scene.owner)
     for record, for_caustics in zip(records, (False, True), strict=True):
-        spheres = spheres_of(scene.owner, for_caustics)
+        spheres = covering.around[covering.caustic] if for_caustics else covering.around
         if with_caustics or not for_caustics:
             maps = [_denser_or_map(scene, i, spheres, small, confined) for i in range(len(scene.light_names))]
         else:
