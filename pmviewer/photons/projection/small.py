@@ -73,7 +73,8 @@ def _without_floor(scene: Scene, radius: float, triangles: dict[int, Float]) -> 
                 if id(mesh) not in triangles:
                     triangles[id(mesh)] = mesh.vertices[mesh.faces].astype(float)
                 corners = triangles[id(mesh)]
-                low, high = corners.min(axis=1), corners.max(axis=1)
+                a, b, c = corners.transpose(1, 0, 2)
+                low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
                 large = np.linalg.norm(high - low, axis=1) > wide
                 sheets.append(_sheets_of(corners[large]))
                 low, high = low[~large], high[~large]
