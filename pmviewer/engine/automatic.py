@@ -23,6 +23,7 @@ def automatic_values(looked: Looked, first: FirstRadii) -> dict[str, Any]:
     plan, settings, radius = looked.plan, looked.settings, looked.scene.flat.radius
     found: dict[str, Any] = {"light.rig": _rig(looked.scene), "render.lights": "hidden" if plan.hides else "shown"}
     if plan.photons:
+        found["estimate.lookup"] = "nearest" if plan.nearest else "radius"
         found["estimate.radius"] = first.global_ / radius
         automatic = settings.estimate.radius == "auto"
         found["estimate.caustic_radius"] = first.caustic / (first.usual if automatic else first.global_)
@@ -35,11 +36,11 @@ def automatic_values(looked: Looked, first: FirstRadii) -> dict[str, Any]:
     found["direct.choice"] = plan.choice
     found["direct.samples"] = plan.light_samples
     if looked.latest is not None:
-        found |= _of_maps(looked.latest, settings, radius)
+        found |= _of_maps(looked.latest, settings, plan.nearest, radius)
     return found
 
 
-def _of_maps(latest: RenderedPass, settings: Settings, radius: float) -> dict[str, Any]:
+def _of_maps(latest: RenderedPass, settings: Settings, nearest: bool, radius: float) -> dict[str, Any]:
     """Of a pass, in a scene of that bounding-sphere radius."""
     maps, found = latest.maps, dict[str, Any]()
     widest = [made.radius for made in maps.by_name.values() if not isinstance(made.structure, PhotonGrid)]
@@ -53,7 +54,6 @@ def _of_maps(latest: RenderedPass, settings: Settings, radius: float) -> dict[st
     if latest.shadows is not None:
         found["direct.shadow_radius"] = latest.shadows.grid.radius / radius
     if maps.radiance is not None:
-        nearest = settings.estimate.lookup == "nearest"
         found["gather.cutoff"] = AUTOMATIC_CUTOFF_NEAREST if nearest else AUTOMATIC_CUTOFF
     rules = maps.rules
     if rules.f:

@@ -84,7 +84,7 @@ def _dropped(place: str, count: int) -> str:
 def _too_few(settings: Settings, plan: Plan, tally: Tally, scene_radius: float, pixels: int) -> list[str]:
     """Look-ups that find next to nothing: a pass of them sees no light rather than noisy light."""
     estimate = settings.estimate
-    if estimate.lookup == "nearest":
+    if plan.nearest:
         if estimate.k == 1 and estimate.rim == "left out":
             return ["A look-up of k = 1 photon that leaves out the outermost finds none: choose estimate.rim = whole."]
         return []

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
+from pmviewer.engine.look_up_plan import estimator_of, reaches_to_nearest
 from pmviewer.engine.media_plan import BLURRED, BLURRED_FROM, THIN, in_media
 from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
-from pmviewer.maps.variant import Estimator
 from pmviewer.render.camera import are_hidden
 from pmviewer.render.direct.choice import ASKING, LISTED
 from pmviewer.render.direct.samples import samples_at_surface
@@ -59,6 +59,7 @@ class Plan:
     whether camera paths go both ways at glass, `mirror_rays` how many samples a pass pixels have that show a mirror or
     glass, `one_sample` whether something forbids more than one, and `adaptive` whether noisy pixels get more
     (`pmviewer.render.adaptive`); `hides` whether the picture shows no lights;
+    `nearest` is whether look-ups reach to the nearest photons, however far these are;
     `thin_glass` are the rules by which light passes panes of glass, () where all of it is exact; `maps` is how many
     parts of the light pass have photon maps of their own; `warnings` are sentences for the log about what was asked for
     and can't be."""
@@ -83,6 +84,7 @@ class Plan:
     deposition: Deposit = "all"
     emission: Emission = "off"
     convergence: int = 0
+    nearest: bool = False
     lens: bool = False
     filtered: bool = False
     moments: bool = True
@@ -198,6 +200,7 @@ def _plan_of(settings: Settings, traits: SceneTraits) -> Plan:
         )
     plan = replace(
         plan,
+        nearest=reaches_to_nearest(settings, traits),
         lens=_has_lens(settings, traits),
         filtered=_filtered(settings, traits),
         split=_splits(settings, traits, plan),
@@ -238,7 +241,7 @@ def _plan_of(settings: Settings, traits: SceneTraits) -> Plan:
 
 def _maps(settings: Settings, plan: Plan) -> int:
     """Parts of the light pass whose maps are looked up each, where that is not the same as one map of all."""
-    of_k = settings.estimate.lookup == "nearest" and estimator_of(settings) == "disc"
+    of_k = plan.nearest and estimator_of(settings) == "disc"
     return settings.photons.maps if of_k and not plan.chooses_photons else 1
 
 
@@ -471,13 +474,6 @@ def _estimation(settings: Settings, traits: SceneTraits) -> tuple[bool, str]:
     if settings.gather.cache == "on":
         return False, "the irradiance cache interpolates instead"
     return traits.has_diffuse, "no diffuse surface in the scene"
-
-
-def estimator_of(settings: Settings) -> Estimator:
-    """The density estimate that maps are looked up with."""
-    if settings.estimate.area == "convex hull":
-        return "hull"
-    return "differential" if settings.estimate.differential else "disc"
 
 
 def _light_choice(settings: Settings, traits: SceneTraits, photons: bool = True) -> tuple[str, str]:

@@ -12,10 +12,11 @@ import numpy as np
 from pmviewer.engine.auto.bias import Bias
 from pmviewer.engine.memory import check_scene_memory
 from pmviewer.engine.stages.hidden_lights import hidden_lights
-from pmviewer.photons.projection.projection import Projection
+from pmviewer.photons.projection.aim import may_aim
+from pmviewer.photons.projection.projection import Projection, aims
 from pmviewer.scene.analysis import SceneTraits, analyse
 from pmviewer.scene.arrays.covered_emission import ignored_opacity, without_unseen_lights
-from pmviewer.scene.arrays.flatten import FlatScene, flatten
+from pmviewer.scene.arrays.flatten import FlatScene, bounding_sphere, flatten
 from pmviewer.scene.arrays.tree_ahead import TreeAhead, tree_ahead
 from pmviewer.scene.defaults.completion import completed
 from pmviewer.scene.defaults.light_rigs import Rig
@@ -119,6 +120,12 @@ def is_edited(before: OpenScene | None, after: OpenScene) -> bool:
     return before is not None and before.whole is after.whole
 
 
+def traits_of(flat: FlatScene) -> SceneTraits:
+    """With what only the flattened scene tells."""
+    traits = analyse(flat.owner)
+    return replace(traits, aims=aims(flat, not traits.lit_media))
+
+
 def _opened(
     whole: Scene,
     source: str,
@@ -132,7 +139,9 @@ def _opened(
     check_scene_memory(scene)
     scene = without_unseen_lights(recentred(scene))
     traits = analyse(scene)
+    traits = replace(traits, aims=may_aim(scene, bounding_sphere(scene)[1]))
     flat = flatten(scene, lambda of_record: on_type(of_record, traits), like, ahead=ahead)
+    traits = replace(traits, aims=traits.aims and aims(flat, not traits.lit_media))
     said = (*hidden_lights(scene, flat), *ignored_opacity(scene), *flat.said)
     if said:
         scene = replace(scene, warnings=(*scene.warnings, *said))

@@ -138,7 +138,7 @@ def _light_steps(scene: OpenScene, settings: Settings, plan: Plan) -> list[Step]
         steps.append(Step("deposition rules", prepare_rules))
     if plan.convergence:
         steps.append(Step("caustic convergence", prepare_convergence))
-    if settings.estimate.lookup == "nearest" or (plan.volume and settings.estimate.in_media == "nearest"):
+    if plan.nearest or (plan.volume and settings.estimate.in_media == "nearest"):
         steps.append(Step("kd-tree", build_kdtree, (photons, 1.0)))
     return [*steps, grid_step()]
 

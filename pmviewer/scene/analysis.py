@@ -74,6 +74,9 @@ class SceneTraits:
     """Lights that rays can meet."""
     has_smooth_glass: bool = False
     """Surfaces that reflect and refract as deltas."""
+    aims: bool = False
+    """Something is so small on a wide stage that photons aim at it (`pmviewer.photons.projection.aim`). `analyse`
+    doesn't tell."""
 
     @property
     def lit_media(self) -> bool:

@@ -16,7 +16,7 @@ from pmviewer.engine.auto.candidates import (
     CORNERS,
     GATHER,
     LIGHTS_CAUSTICS,
-    NEAREST_NAME,
+    ONE_RADIUS_NAME,
     PATH,
     PROGRESSIVE,
     SHOWN,
@@ -63,12 +63,12 @@ def test_what_traits_rule_out_is_not_tried():
 
 
 def test_gathers_look_up_the_nearest_photons_where_photons_aim():
-    """Progressive as well, beside the default, which comes first."""
+    """Progressive as well, which comes first as the default, and beside it with one radius."""
     found = candidates(PLAIN, Settings(), 10.0, aims=True)[0]
     assert [c.name for c in found] == [
-        PROGRESSIVE.name, NEAREST_NAME, GATHER.name, CACHE.name, CACHE_CORNERS.name, PATH.name
+        PROGRESSIVE.name, ONE_RADIUS_NAME, GATHER.name, CACHE.name, CACHE_CORNERS.name, PATH.name
     ]  # fmt: skip
-    assert [c.name for c in found if not c.by_nearest] == [PROGRESSIVE.name, PATH.name]
+    assert [c.name for c in found if not c.by_nearest] == [ONE_RADIUS_NAME, PATH.name]
     assert all(any("estimate.lookup" in said for said in c.said) for c in found if c.by_nearest)
     assert not any(c.by_nearest for c in candidates(PLAIN, Settings(), 10.0)[0])
 

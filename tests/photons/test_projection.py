@@ -17,7 +17,7 @@ from pmviewer.maps.record import CAUSTIC, INDIRECT_CAUSTIC, unpack
 from pmviewer.photons.light_pass import plan as passplan
 from pmviewer.photons.light_pass.ledger import E_ABSORBED, E_EMITTED, E_ESCAPED, E_TERMINATED
 from pmviewer.photons.light_pass.light_pass import trace_pass
-from pmviewer.photons.projection.bounds import MOST_SPHERES, enclosing, spheres_of
+from pmviewer.photons.projection.bounds import MOST_OF_MESHES, MOST_SPHERES, enclosing, spheres_of
 from pmviewer.photons.projection.projected import concentric_from_polar
 from pmviewer.photons.projection.projection import projection_of
 from pmviewer.scene.arrays.flatten import LUMINANCE, flatten
@@ -25,7 +25,7 @@ from pmviewer.scene.description import Cylinder, Disk, Parallelogram, PointLight
 from pmviewer.settings.access import Photons
 from tests.support.device import from_python
 from tests.support.light_probe import LEANING, MORE, emit
-from tests.support.scenes import GLASS, LIGHTS, ball_mesh, diffuse_box, light_scene, settings_of
+from tests.support.scenes import GLASS, LIGHTS, MIRROR, ball_mesh, diffuse, diffuse_box, light_scene, settings_of
 
 pytestmark = pytest.mark.usefixtures("every_surface")
 
@@ -276,3 +276,19 @@ def test_units_of_the_caustic_map_follow_the_strongest_photons(monkeypatch):
     assert np.array_equal(plain["path_class"], scaled["path_class"])
     assert {CAUSTIC, INDIRECT_CAUSTIC} <= set(plain["path_class"])
     np.testing.assert_allclose(scaled["Phi"], plain["Phi"], rtol=1e-3)
+
+
+def test_many_meshes_share_their_spheres():
+    """Of a room of a thousand meshes, as exporters write them, each has few; all of them cover it."""
+    places = np.random.default_rng(3).random((1000, 3)) * 10
+    meshes = [replace(ball, vertices=ball.vertices + place) for ball in [ball_mesh(0.2, 2)] for place in places]
+    shapes = tuple(Shape(f"mesh {i}", mesh, i % 2) for i, mesh in enumerate(meshes))
+    scene = light_scene()
+    spheres = spheres_of(replace(scene, shapes=shapes, materials=(diffuse(), MIRROR)))
+    assert 1000 < len(spheres.around) <= MOST_OF_MESHES
+    assert len(spheres.caustic) == len(spheres.around)
+    assert spheres.caustic.mean() == pytest.approx(0.5)
+    for mesh in meshes[1:100:2]:
+        near = spheres.around[spheres.caustic]
+        gap = np.linalg.norm(mesh.vertices[:, None] - near[None, :, :3], axis=2) - near[None, :, 3]
+        assert gap.min(axis=1).max() <= 1e-12

@@ -51,7 +51,7 @@ CHOSEN = (
 """CORNERS, CACHE_CORNERS, LESS_BIAS, MORE_COST, RECORDS, EDGES, SHOWN and NEAREST of `pmviewer.engine.auto.candidates`,
 `pmviewer.render.direct.by_lobes`, HIDDEN of `pmviewer.engine.auto.widths`, `pmviewer.render.adaptive`, GATHERED_ORDER
 and STEADY of `pmviewer.engine.auto.bias`, the powers of `pmviewer.engine.auto.model` and `measured`, HELD and MOST of
-`pmviewer.engine.auto.sparse`, LEAST_GAIN of `pmviewer.photons.projection.projection`, and FEWER_PHOTONS of
+`pmviewer.engine.auto.sparse`, LEAST_GAIN of `pmviewer.photons.projection.aim`, and FEWER_PHOTONS of
 `pmviewer.engine.auto.choose`, said in the targets' own lines."""
 
 

@@ -43,6 +43,11 @@ class Candidate:
         return self.values.get("render.method") == "gather"
 
     @property
+    def shows(self) -> bool:
+        """Whether indirect light is photons that are shown directly."""
+        return "render.method" not in self.values
+
+    @property
     def by_nearest(self) -> bool:
         """Whether look-ups reach to the nearest photons, however far these are."""
         return self.values.get("estimate.lookup") == "nearest"
@@ -102,7 +107,7 @@ NEAREST = {"estimate.lookup": "nearest"}
 and the rest, which rays meet, too. relMSE after 8 CPU s over that with one radius, four random stages: gather 6e-4,
 3e-3, 0.05 and 1.0, progressive 0.01, 0.06, 0.15 and 1.1; a teapot on a wide floor 1.0 and 0.9, a space ship under a
 dome 2.4 and 1.5 (files)."""
-NEAREST_NAME = "progressive, nearest photons"
+ONE_RADIUS_NAME, ONE_RADIUS = "progressive, one radius", {"estimate.lookup": "radius"}
 WHY_NEAREST = (
     "photons lie close at what is small and far apart elsewhere: look-ups reach to the nearest (estimate.lookup)"
 )
@@ -128,8 +133,10 @@ def candidates(
         gather, cache, corners = (way.having(caustics, *why) for way in (gather, cache, corners))
     found = [progressive, gather]
     if aims:
-        gather, cache, corners = (way.having(NEAREST, WHY_NEAREST) for way in (gather, cache, corners))
-        found = [progressive, replace(progressive.having(NEAREST, WHY_NEAREST), name=NEAREST_NAME), gather]
+        one_radius = replace(progressive.having(ONE_RADIUS), name=ONE_RADIUS_NAME)
+        progressive, *others = (way.having(NEAREST, WHY_NEAREST) for way in (progressive, gather, cache, corners))
+        gather, cache, corners = others
+        found = [progressive, one_radius, gather]
     if traits.lit_media:
         left_out.append(("irradiance cache", "it does not know of media that scatter or emit light"))
     elif not traits.has_diffuse:

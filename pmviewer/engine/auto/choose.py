@@ -17,7 +17,6 @@ from pmviewer.engine.auto.trial import Tell, trial
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.pool import WorkPool
-from pmviewer.engine.stages.projection import aims
 from pmviewer.render.adaptive import DECIDED_AFTER, WORTH
 from pmviewer.render.camera import resolve_camera
 from pmviewer.settings.access import SETTINGS, Settings, with_values
@@ -76,7 +75,7 @@ def choose(opened: OpenScene, settings: Settings, goal: Goal, pool: WorkPool, te
     sets itself does not count. Raises Cancelled when the pool is cancelled."""
     base = with_values(settings, assignments({}))
     seconds = goal.seconds or USUAL
-    found, left_out = candidates(opened.traits, base, seconds, goal.apart, aims(opened, base))
+    found, left_out = candidates(opened.traits, base, seconds, goal.apart, plan_of(base, opened.traits).nearest)
     said = [f"not tried: {what}, {why}" for what, why in left_out]
     camera = resolve_camera(opened.scene, base.camera)
     size = planned(SHARE * seconds, len(found), camera.width, camera.height)
@@ -154,8 +153,8 @@ def _picked(found: list[Option], promised: Callable[[Option], float], fewer: flo
     the same more often. The default unless another is clearly better."""
 
     def of(option: Option) -> float:
-        few, directly = option.numbers.N < _DEFAULT.N, option.measured.candidate.is_like(PROGRESSIVE)
-        return promised(option) * (fewer if few else 1.0) * (shown if directly else 1.0)
+        few = option.numbers.N < _DEFAULT.N
+        return promised(option) * (fewer if few else 1.0) * (shown if option.measured.candidate.shows else 1.0)
 
     best = min(found, key=of)
     if best.measured.candidate.gathers:

@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 
 from pmviewer.engine.cluster.packed import PackedIncrement, pack
 from pmviewer.engine.cluster.shared_memory import Handle, Writer, Written
-from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.opened import OpenScene, traits_of
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
@@ -26,7 +26,6 @@ from pmviewer.engine.told import Told
 from pmviewer.errors import PmviewerError
 from pmviewer.heap import give_back
 from pmviewer.progress import Cancelled
-from pmviewer.scene.analysis import analyse
 from pmviewer.scene.arrays.flatten import FlatScene, flatten
 from pmviewer.settings.access import Settings
 
@@ -209,7 +208,7 @@ def _opened(payload: bytes) -> tuple[OpenScene, str]:
 
     scene, source = pickle.loads(decompress(payload))
     flat = flatten(scene)
-    return OpenScene(scene, flat, analyse(scene), source), digest_of(flat)
+    return OpenScene(scene, flat, traits_of(flat), source), digest_of(flat)
 
 
 def _kept(held: OrderedDict[Any, T], key: Any, most: int, make: Callable[[], T]) -> T:

@@ -20,7 +20,7 @@ from pmviewer.engine.inspector.near import (
     within,
 )
 from pmviewer.engine.inspector.report import Float, Found, LookUp, luminance
-from pmviewer.engine.method import estimator_of
+from pmviewer.engine.look_up_plan import estimator_of
 from pmviewer.engine.stages.pass_data import RenderedPass
 from pmviewer.engine.stages.pass_maps import PassMaps
 from pmviewer.engine.stages.virtual_lights import lights_asked

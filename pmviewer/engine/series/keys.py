@@ -92,7 +92,12 @@ def with_one_radius(opened: OpenScene, settings: Sequence[Settings]) -> list[Set
     if len(set(radii)) < 2:
         return list(settings)
     first = mean_radii(radii)
-    return [with_values(one, first.values(one.estimate)) if one.estimate.radius == "auto" else one for one in settings]
+
+    def with_radius(one: Settings) -> Settings:
+        kept = {"estimate.lookup": "nearest"} if plan_of(one, opened.traits).nearest else {}
+        return with_values(one, {**first.values(one.estimate), **kept})
+
+    return [with_radius(one) if one.estimate.radius == "auto" else one for one in settings]
 
 
 def _turned(v: NDArray[np.float64], axis: NDArray[np.float64], angle: float) -> NDArray[np.float64]:

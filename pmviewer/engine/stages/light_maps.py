@@ -106,7 +106,7 @@ class MapBuilder:
     def _empty(self) -> tuple[Structure, PhotonGrid]:
         none = np.empty((0, 6), np.float32)
         grid = self.store.get(("empty", "radius"), lambda: build_grid(none, 1.0, 1.0), lambda _: 0)
-        if self.settings.estimate.lookup == "nearest":
+        if self.plan.nearest:
             tree = self.store.get(("empty", "nearest"), lambda: build_kdtree(none, 1.0), lambda _: 0)
             return (parts_of([tree]) if self.plan.maps > 1 else tree), grid
         return grid, grid
@@ -129,7 +129,7 @@ class MapBuilder:
         return found[0], found[1]
 
     def _look_up_key(self, light: LightPlan, name: str) -> tuple[Any, ...]:
-        if self.settings.estimate.lookup == "nearest":
+        if self.plan.nearest:
             return ("nearest", self.settings.estimate, light.maps)
         return "radius", light.radii[name], light.reach[name]
 
@@ -141,7 +141,7 @@ class MapBuilder:
         classes = self._classes(name)
         if not classes:
             return None
-        if self.settings.estimate.lookup == "nearest":
+        if self.plan.nearest:
             return (yield from one_step(lambda: self._photon_tree(light, photons, name, classes)))
         stored, unit = _stored(photons, name)
         return LookUpMap((yield from grid_steps(stored, light.reach[name], unit, pieces, classes)), light.radii[name])

@@ -57,7 +57,7 @@ def light_plan(
     rules = Rules()
     if plan.deposition != "all":
         rules = rules_of(settings, plan, importance, index, radii, first.global_)
-    normals = plan.radiance or (plan.corners and estimate.lookup == "nearest")
+    normals = plan.radiance or (plan.corners and plan.nearest)
     neighbours = pass_neighbours(index, estimate, plan.maps)
     kept = index < importance.store.passes
     return LightPlan(index, N, radii, reach, paths, *neighbours, normals, rules, plan.maps, kept)

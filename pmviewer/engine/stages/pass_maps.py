@@ -149,7 +149,7 @@ def blank_tree() -> PhotonKdTree:
 def blank_maps(settings: Settings, plan: Plan) -> PassMaps:
     """Maps of the types that passes with these settings have, for compiling ahead; not to be looked up."""
     structure: Structure = blank_grid()
-    if settings.estimate.lookup == "nearest":
+    if plan.nearest:
         structure = parts_of([blank_tree()]) if plan.maps > 1 else blank_tree()
     grid = blank_grid()
     return PassMaps(

@@ -5,11 +5,9 @@ from __future__ import annotations
 from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.photons.light_pass.plan import trajectories
+from pmviewer.photons.projection.aim import MOST_LIGHTS
 from pmviewer.photons.projection.projection import Projection, projection_of
 from pmviewer.settings.access import Settings
-
-MOST_LIGHTS = 64
-"""Of more lights, `auto` makes no maps: they would take longer than they spare."""
 
 
 def projection_for(scene: OpenScene, settings: Settings) -> Projection | None:
@@ -23,13 +21,9 @@ def projection_for(scene: OpenScene, settings: Settings) -> Projection | None:
     key = (wanted, traced > filling)
     if key not in scene.projections:
         confined = not scene.traits.lit_media
-        made = projection_of(scene.flat, wanted == "on", traced > filling, confined)
+        made = projection_of(
+            scene.flat, wanted == "on", traced > filling, confined, wanted == "on" or scene.traits.aims
+        )
         useful = made.surface_power > 0 and (made.spares or (wanted == "on" and confined))  # else no photon would start
         scene.projections[key] = made if useful else None
     return scene.projections[key]
-
-
-def aims(scene: OpenScene, settings: Settings) -> bool:
-    """Whether photons aim at what is small on a stage."""
-    made = projection_for(scene, settings)
-    return made is not None and made.gain > 1.0

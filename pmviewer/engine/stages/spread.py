@@ -69,7 +69,7 @@ def radii_of_first_pass(
     usual = first_radius(flat, camera, estimate, plan.gather)
     asked = estimate.caustic_radius
     caustic = usual * (CAUSTIC_SHARE if asked == "auto" else asked)
-    if estimate.radius != "auto" or estimate.lookup == "nearest":
+    if estimate.radius != "auto" or plan.nearest:
         return FirstRadii(usual, usual, caustic, paths)
     shown = 0 if plan.gather else plan.shown_directly
     looked_up = plan.caustic_classes if asked == "auto" else 0

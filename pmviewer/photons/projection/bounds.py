@@ -111,7 +111,8 @@ def _box(low: Float, high: Float) -> Float:
 
 def _mesh(mesh: Mesh, most: int) -> Float:
     vertices = np.ascontiguousarray(mesh.vertices.T, float)
-    middles = sum(np.take(vertices, mesh.faces[:, corner], axis=1) for corner in range(3)) / 3
+    a, b, c = (np.take(vertices, mesh.faces[:, corner], axis=1) for corner in range(3))
+    middles = (a + b + c) / 3
     parts = [np.arange(len(mesh.faces))]
     while len(parts) < most and max(map(len, parts)) > 1:
         parts = [half for part in parts for half in _halves(middles, part)]

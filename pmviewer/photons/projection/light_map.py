@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels import scene as K
+from pmviewer.photons.projection.aim import described_lights
 from pmviewer.photons.projection.bounds import enclosing
 from pmviewer.photons.projection.cells import SLACK, cells_of_directions, cells_of_places
 from pmviewer.photons.projection.projected import (
@@ -145,7 +146,7 @@ def _celled(
 
 def described_light(scene: FlatScene, light: int) -> object:
     """The shape that emits, or the light without a surface, in the order of the table; None of a medium that emits."""
-    described = [*(shape for shape in scene.owner.shapes if shape.shines), *scene.owner.lights]
+    described = described_lights(scene.owner)
     return described[light] if light < len(described) else None
 
 

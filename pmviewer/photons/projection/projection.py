@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pmviewer.photons.projection.aim import LEAST_GAIN, aim_of, may_aim, standing
 from pmviewer.photons.projection.bounds import enclosing, spheres_of
-from pmviewer.photons.projection.gain import gain_of
 from pmviewer.photons.projection.light_map import (
     MODES,
     ProjectionMap,
@@ -21,24 +21,17 @@ from pmviewer.photons.projection.light_map import (
     slack,
     whole,
 )
-from pmviewer.photons.projection.projected import CONES, PROJECTION_DTYPE, SCALES, WHOLE
-from pmviewer.photons.projection.scales import gain, scales
-from pmviewer.photons.projection.small import Small, small_of
+from pmviewer.photons.projection.projected import PROJECTION_DTYPE, WHOLE
+from pmviewer.photons.projection.scales import scales
+from pmviewer.photons.projection.small import Small
 from pmviewer.scene.arrays.flatten import FlatScene
-from pmviewer.scene.description import LUMINANCE, DirectionalLight, Environment, PointLight, Shape
+from pmviewer.scene.description import LUMINANCE
 
 Float = NDArray[np.float64]
 MOST_FACTOR = 16.0
 """Of a photon's power, over what photons aimed at the small have, with which it aims there again from surfaces."""
 WORTHWHILE = 0.7
 """`auto` uses maps that cover less than this share of the power."""
-LEAST_GAIN = {SCALES: 8.0, CONES: 16.0}
-"""Times that photons start more densely for what is small than by a map, or it isn't worth what is lacking elsewhere.
-Skies, gains of 3 to 7 in three scenes: relMSE after 4 CPU s 0.8 to 1.5 times that without, 1.0 in the mean. Lamps
-nearby, 5 to 9 in a prism's yard, three glasses and rings: 1.0 to 1.7 times after 5, of a ship under a dome (355) 0.24.
-"""
-SMALLEST = 1e-6
-"""Least radius of the innermost disc or cone, relative to the scene's: float32 tells directions apart to 6e-8."""
 MOST_GAIN = 2.0**10
 """Times that photons start more densely for what is small, and have more power where they don't: stored powers end at
 2¹⁷."""
@@ -74,19 +67,18 @@ class Projection:
 
 
 def projection_of(
-    scene: FlatScene, always: bool = True, with_caustics: bool = True, confined: bool = True
+    scene: FlatScene, always: bool = True, with_caustics: bool = True, confined: bool = True, aiming: bool = True
 ) -> Projection:
     """Projection maps of the scene's lights. Unless `always`, those that spare little are replaced by none at all;
     `with_caustics` says whether there are trajectories for the caustic map alone. Unless `confined`, photons start
-    anywhere, and are at most denser for what is small: media that scatter are met where no surface is."""
+    anywhere, and are at most denser for what is small: media that scatter are met where no surface is. Unless `aiming`,
+    none are."""
     records = np.zeros(2, PROJECTION_DTYPE)
     arrays: list[NDArray] = []
     charted: list[tuple[tuple[ProjectionMap, ...], float, float]] = []
     total = scene.total_luminance
     most_gain = 1.0
-    small = small_of(scene.owner, scene.radius)
-    if small is not None:
-        small = small._replace(radius=max(small.radius, SMALLEST * scene.radius))
+    small = standing(scene.owner, scene.radius) if aiming else None
     covering = spheres_of(scene.owner)
     for record, for_caustics in zip(records, (False, True), strict=True):
         spheres = covering.around[covering.caustic] if for_caustics else covering.around
@@ -125,6 +117,11 @@ def projection_of(
     return Projection(records, tuple(arrays), surfaces, caustic, surface_power, caustic_power, covered, most_gain)
 
 
+def aims(scene: FlatScene, confined: bool = True) -> bool:
+    """Whether photons aim at what is small in such a scene."""
+    return may_aim(scene.owner, scene.radius) and projection_of(scene, False, True, confined).gain > 1.0
+
+
 _CELLED = ("directions", "places", "world directions")
 
 
@@ -134,20 +131,10 @@ def _denser_or_map(
     """What makes photons denser at what is small: more of them that start near it or aim at it, or the light's map.
     With c, the share of its power that its photons bring."""
     found, c = map_of(scene, light, spheres) if confined else whole(scene, light)
-    mode, times = _gain(scene, light, small) if small is not None and c > 0 else (WHOLE, 1.0)
-    if small is None or mode == WHOLE or times * c <= LEAST_GAIN[mode]:
+    if small is None or c <= 0:
+        return found, c
+    mode, times = aim_of(described_light(scene, light), scene.radius, small)
+    if times * c <= LEAST_GAIN[mode]:
         return found, c
     everywhere, c = whole(scene, light)
     return replace(everywhere, mode=MODES[mode], origin=small.center, gain=min(times, MOST_GAIN)), c
-
-
-def _gain(scene: FlatScene, light: int, small: Small) -> tuple[int, float]:
-    """How many times as densely a light's photons can start for what is small, and by what."""
-    described = described_light(scene, light)
-    if isinstance(described, Environment | DirectionalLight):
-        return SCALES, gain(small.radius, scene.radius)
-    if isinstance(described, PointLight):
-        return CONES, gain_of(None, np.array(described.position, float), small)
-    if isinstance(described, Shape):
-        return CONES, gain_of(described.geometry, None, small)
-    return WHOLE, 1.0

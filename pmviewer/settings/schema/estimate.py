@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 from pmviewer.settings.needs import CAUSTIC_MAP, PHOTONS, VOLUME, Need, Needs
 from pmviewer.settings.schema.base import Auto, Group, setting
 
-NEAREST = Need(lambda f: f.settings.estimate.lookup == "nearest", "Only with look-up 'nearest'.")
+NEAREST = Need(lambda f: f.plan.nearest, "Only with look-up 'nearest'.")
 FIXED_RADIUS = Need(
     lambda f: f.settings.estimate.lookup != "nearest",
     "Not with look-up 'nearest': the k nearest photons set the radius.",
@@ -18,7 +18,7 @@ RADIUS_OR_MEDIA = Need(
 )
 AUTOMATIC_MAX_RADIUS = Need(
     lambda f: (
-        (f.settings.estimate.lookup == "nearest" and f.settings.estimate.max_radius == "auto")
+        (f.plan.nearest and f.settings.estimate.max_radius == "auto")
         or (f.plan.volume and f.settings.estimate.in_media == "nearest")
     ),
     "Only with an automatic maximum radius of the k nearest photons.",
@@ -40,17 +40,15 @@ SHOWN_DIRECTLY = Need(
     "Gather rays alone look photons up, with the radius of the pass.",
 )
 AUTOMATIC_RADIUS = Need(
-    lambda f: f.settings.estimate.lookup != "nearest" or f.settings.estimate.max_radius == "auto",
+    lambda f: not f.plan.nearest or f.settings.estimate.max_radius == "auto",
     "With look-up 'nearest' it bounds the automatic maximum radius.",
 )
 SHRINKING_RADIUS = Need(
-    lambda f: f.settings.estimate.lookup == "nearest" or f.settings.estimate.alpha != 1.0,
+    lambda f: f.plan.nearest or f.settings.estimate.alpha != 1.0,
     "The radius does not shrink with alpha = 1.",
 )
 PASS_RADIUS = Need(
-    lambda f: (
-        f.settings.estimate.radius_rule == "pass" or f.settings.estimate.lookup == "nearest" or bool(f.plan.gather)
-    ),
+    lambda f: f.settings.estimate.radius_rule == "pass" or f.plan.nearest or bool(f.plan.gather),
     "Each pixel's radius shrinks by the photons that it finds (estimate.radius_rule).",
 )
 SEVERAL_MAPS = Need(lambda f: f.plan.maps > 1, "One map is looked up (photons.maps).")
@@ -200,9 +198,11 @@ class Estimate(Group):
             SHRINKING_RADIUS,
         ),
     )
-    lookup: Literal["radius", "nearest"] = setting(
-        "radius",
-        "Photons within the radius of the pass, or the k nearest ones (up to the maximum radius).",
+    lookup: Literal["auto", "radius", "nearest"] = setting(
+        "auto",
+        "Photons within the radius of the pass, or the k nearest ones (up to the maximum radius). Automatic: the "
+        "nearest where photons aim at what is small on a wide stage, so that they are a hundred times as dense there "
+        "as elsewhere, and the radius isn't set by hand; else the radius.",
         section="Look-up",
         stage="maps",
         scale="choice",

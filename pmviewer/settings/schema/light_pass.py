@@ -18,7 +18,7 @@ PLAIN_EMISSION_FOR_Q = Need(
     lambda f: f.plan.emission == "off", "With guided emission q is the probability of storing a global photon."
 )
 LOOKED_UP_BY_K = Need(
-    lambda f: f.settings.estimate.lookup == "nearest",
+    lambda f: f.plan.nearest,
     "Look-ups of a fixed radius find the same photons in several maps as in one (estimate.lookup).",
 )
 PLAIN_DISC = Need(

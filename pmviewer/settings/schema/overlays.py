@@ -39,7 +39,7 @@ SEVERAL_MAPS = Need(
     lambda f: sum(map(bool, (f.plan.caustic_classes, f.plan.global_classes, f.plan.volume))) > 1, "There is one map."
 )
 TREE = Need(
-    lambda f: f.settings.estimate.lookup == "nearest",
+    lambda f: f.plan.nearest,
     "The map is a grid, whose cells are all of one size: only nearest look-ups have a kd-tree (estimate.lookup).",
 )
 
