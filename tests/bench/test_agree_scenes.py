@@ -211,14 +211,17 @@ def test_projectors_are_in_all_scenes_from_a_number_on_and_the_scenes_before_are
 
 def test_photons_aim_at_what_stands_on_wide_stages(tmp_path):
     """Whatever is there, with media and without; files are read without a warning."""
-    aims = 0
+    aims, stages = 0, Counter[str]()
     for i in range(STAGED_FROM, STAGED_FROM + 26):
         made = scene_of(3, i)
+        stages.update(name for name in features(made) if "stage" in name)
         assert not needs_particles(made), i
         scene = load_scene(write_scene(made, tmp_path, f"scene{i}")[0])
         assert [w for w in scene.warnings if not any(h in w for h in HARMLESS)] == [], i
         aims += projection_of(flatten(scene), confined=not has_media(made)).gain > 1
     assert aims >= 20
+    assert len(stages) == 2
+    assert sum(stages.values()) == 26
     assert sum(has_media(scene_of(3, i)) for i in range(STAGED_FROM, STAGED_FROM + 26)) == 2
 
 

@@ -91,7 +91,8 @@ def _lights(scene: Node) -> Iterator[str]:
             yield f"light: area on {shape['type']}"
             if isinstance(shape["emitter"]["radiance"], dict):
                 yield "light: textured area"
-            if [step for step in shape["to_world"] if step[0] == "translate"][-1][1][2] <= 0.4:
+            moved = [step for step in shape["to_world"] if step[0] == "translate"]
+            if moved and moved[-1][1][2] <= 0.4:
                 yield "light: touches or crosses"
     if len(emitters_of(scene)) > 1:
         yield "light: several"
@@ -125,6 +126,8 @@ def _whole(scene: Node) -> Iterator[str]:
     if not any("diffuse" in kind or "plastic" in kind for kind in kinds):
         yield "scene: nothing diffuse"
     yield "scene: closed" if scene["closed"] else "scene: open"
+    if "stage" in scene:
+        yield f"scene: wide stage under a {scene['stage']}"
     if scene["nested"]:
         yield "scene: nested glass"
     if scene["scale"] < 1:

@@ -15,6 +15,7 @@ from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
+from pmviewer.photons.projection.aim import standing
 from pmviewer.render.planes import PLANES, terms_of
 from pmviewer.render.virtual_lights.film import WeightedFilm
 from pmviewer.settings.access import Settings, with_values
@@ -49,6 +50,8 @@ THIN_GLASS: Mapping[str, Mapping[str, object]] = {
 PHOTON_METHODS = tuple(name for name in METHODS if name != "path")
 NEAREST_REACH = 4.0
 """Largest radius of a nearest look-up relative to that of a fixed one."""
+AROUND = 2.0
+"""Of a stage, how far beyond what stands there radii are relative to."""
 DEPTH = {"render.max_depth": MAX_DEPTH, "photons.max_bounces": 1000}
 
 
@@ -73,6 +76,13 @@ class Rendered(NamedTuple):
     weights: NDArray[np.float64] | None = None
 
 
+def _seen(opened: OpenScene) -> float:
+    """The part of a scene, by radius, that a camera sees from amid its shapes: of a wide stage what stands there. A
+    look-up that is narrow for a dome reaches over all of that."""
+    small = standing(opened.scene, opened.flat.radius)
+    return 1.0 if small is None else min(AROUND * small.radius / opened.flat.radius, 1.0)
+
+
 def our_runs(
     opened: OpenScene, method: str, effort: Effort, seeds: list[int], pool: WorkPool, max_depth: int = MAX_DEPTH
 ) -> Rendered:
@@ -81,8 +91,9 @@ def our_runs(
     passes = effort.spp
     if method != "path":
         passes = effort.passes
-        values |= {"photons.N": effort.photons, "estimate.radius": effort.radius}
-        values["estimate.max_radius"] = NEAREST_REACH * effort.radius
+        radius = effort.radius * _seen(opened)
+        values |= {"photons.N": effort.photons, "estimate.radius": radius}
+        values["estimate.max_radius"] = NEAREST_REACH * radius
     images, weights = [], []
     prepare(opened, with_values(Settings(), values), pool, lambda text, share: None)
     for seed in seeds:

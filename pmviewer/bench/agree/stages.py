@@ -22,7 +22,8 @@ def stage(draw: Draw, scene: Node, surroundings: int, half: float) -> None:
     if draw.chance(0.5):
         up = [["scale", [wide, wide, 1.0]], ["rotate", [1.0, 0.0, 0.0], 90.0], ["translate", [0.0, wide, wide]]]
         shapes.append({"type": "rectangle", "to_world": up, "bsdf": around[-1]["bsdf"] if around else grey})
-    if draw.chance(0.6):
+    under_dome = draw.chance(0.6)
+    if under_dome:
         dome = {"type": "sphere", "to_world": [["scale", 3 * [2.5 * wide]]], "flip_normals": True}
         shine = {"type": "area", "radiance": draw.colour(0.2, 1.0)}
         bsdf = {"type": "diffuse", "reflectance": draw.colour(0.0, 0.5)}
@@ -34,6 +35,6 @@ def stage(draw: Draw, scene: Node, surroundings: int, half: float) -> None:
         bsdf = {"type": "diffuse", "reflectance": 3 * [0.0]}
     scene["shapes"] = [*shapes, *objects, dome | {"bsdf": bsdf, "emitter": shine}]
     scene["lights"] = [light for light in scene["lights"] if light["type"] not in DELTA]
-    scene["closed"] = False
+    scene |= {"closed": False, "stage": "dome" if under_dome else "panel"}
     if wide * scene["scale"] > FARTHEST:
         scene["scale"] = 1.0
