@@ -6,13 +6,13 @@ import math
 from typing import Any
 
 from pmviewer.engine.diagnose import Looked
+from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.radius import FirstRadii
 from pmviewer.engine.stages.pass_data import RenderedPass
 from pmviewer.engine.stages.radiance_photons import AUTOMATIC_CUTOFF, AUTOMATIC_CUTOFF_NEAREST
 from pmviewer.maps.search.grid import PhotonGrid
 from pmviewer.photons.bounces import most_bounces
-from pmviewer.settings.access import Settings
 
 
 def automatic_values(looked: Looked, first: FirstRadii) -> dict[str, Any]:
@@ -24,6 +24,7 @@ def automatic_values(looked: Looked, first: FirstRadii) -> dict[str, Any]:
     found: dict[str, Any] = {"light.rig": _rig(looked.scene), "render.lights": "hidden" if plan.hides else "shown"}
     if plan.photons:
         found["estimate.lookup"] = "nearest" if plan.nearest else "radius"
+        found["estimate.k"] = plan.neighbours
         found["estimate.radius"] = first.global_ / radius
         automatic = settings.estimate.radius == "auto"
         found["estimate.caustic_radius"] = first.caustic / (first.usual if automatic else first.global_)
@@ -36,16 +37,16 @@ def automatic_values(looked: Looked, first: FirstRadii) -> dict[str, Any]:
     found["direct.choice"] = plan.choice
     found["direct.samples"] = plan.light_samples
     if looked.latest is not None:
-        found |= _of_maps(looked.latest, settings, plan.nearest, radius)
+        found |= _of_maps(looked.latest, plan, radius)
     return found
 
 
-def _of_maps(latest: RenderedPass, settings: Settings, nearest: bool, radius: float) -> dict[str, Any]:
+def _of_maps(latest: RenderedPass, plan: Plan, radius: float) -> dict[str, Any]:
     """Of a pass, in a scene of that bounding-sphere radius."""
     maps, found = latest.maps, dict[str, Any]()
     widest = [made.radius for made in maps.by_name.values() if not isinstance(made.structure, PhotonGrid)]
     if widest:
-        shrunk = math.sqrt(maps.neighbours * maps.parts / settings.estimate.k)
+        shrunk = math.sqrt(maps.neighbours * maps.parts / plan.neighbours)
         found["estimate.max_radius"] = max(widest) / shrunk / radius
     if maps.chooser is not None:
         found["direct.choice_radius"] = maps.chooser.radius / radius
@@ -54,7 +55,7 @@ def _of_maps(latest: RenderedPass, settings: Settings, nearest: bool, radius: fl
     if latest.shadows is not None:
         found["direct.shadow_radius"] = latest.shadows.grid.radius / radius
     if maps.radiance is not None:
-        found["gather.cutoff"] = AUTOMATIC_CUTOFF_NEAREST if nearest else AUTOMATIC_CUTOFF
+        found["gather.cutoff"] = AUTOMATIC_CUTOFF_NEAREST if plan.nearest else AUTOMATIC_CUTOFF
     rules = maps.rules
     if rules.f:
         found["importance.f"] = next(iter(rules.f.values()))

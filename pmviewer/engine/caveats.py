@@ -85,7 +85,7 @@ def _too_few(settings: Settings, plan: Plan, tally: Tally, scene_radius: float, 
     """Look-ups that find next to nothing: a pass of them sees no light rather than noisy light."""
     estimate = settings.estimate
     if plan.nearest:
-        if estimate.k == 1 and estimate.rim == "left out":
+        if plan.neighbours == 1 and estimate.rim == "left out":
             return ["A look-up of k = 1 photon that leaves out the outermost finds none: choose estimate.rim = whole."]
         return []
     radius, photons = tally.radius.get("global", 0.0), tally.stored_in_pass.get("global", 0)

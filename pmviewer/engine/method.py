@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
-from pmviewer.engine.look_up_plan import estimator_of, reaches_to_nearest
+from pmviewer.engine.look_up_plan import estimator_of, first_neighbours, reaches_to_nearest
 from pmviewer.engine.media_plan import BLURRED, BLURRED_FROM, THIN, in_media
 from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.render.camera import are_hidden
@@ -59,7 +59,8 @@ class Plan:
     whether camera paths go both ways at glass, `mirror_rays` how many samples a pass pixels have that show a mirror or
     glass, `one_sample` whether something forbids more than one, and `adaptive` whether noisy pixels get more
     (`pmviewer.render.adaptive`); `hides` whether the picture shows no lights;
-    `nearest` is whether look-ups reach to the nearest photons, however far these are;
+    `nearest` is whether look-ups reach to the nearest photons, however far these are, to `neighbours` in the first
+    pass;
     `thin_glass` are the rules by which light passes panes of glass, () where all of it is exact; `maps` is how many
     parts of the light pass have photon maps of their own; `warnings` are sentences for the log about what was asked for
     and can't be."""
@@ -85,6 +86,7 @@ class Plan:
     emission: Emission = "off"
     convergence: int = 0
     nearest: bool = False
+    neighbours: int = 0
     lens: bool = False
     filtered: bool = False
     moments: bool = True
@@ -201,6 +203,7 @@ def _plan_of(settings: Settings, traits: SceneTraits) -> Plan:
     plan = replace(
         plan,
         nearest=reaches_to_nearest(settings, traits),
+        neighbours=first_neighbours(settings),
         lens=_has_lens(settings, traits),
         filtered=_filtered(settings, traits),
         split=_splits(settings, traits, plan),

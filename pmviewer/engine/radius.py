@@ -109,14 +109,14 @@ def _shrunk(index: int, estimate: Estimate) -> float:
     return progressive_radius(1.0, index + 1, estimate.alpha, delay=estimate.delay)
 
 
-def pass_neighbours(index: int, estimate: Estimate, maps: int = 1) -> tuple[int, float]:
+def pass_neighbours(index: int, estimate: Estimate, first: int, maps: int = 1) -> tuple[int, float]:
     """Neighbours that a k-nearest look-up of pass `index` searches in each of so many maps, and the share of their
-    disc's area that it uses: in all the share r²ᵢ/r²₁ of the area that `estimate.k` fill
+    disc's area that it uses: in all the share r²ᵢ/r²₁ of the area that the `first` pass fills
     (`pmviewer.maps.estimate.nearest`). Several maps are asked for equally many, for two at least."""
     s = _shrunk(index, estimate) ** 2
     if maps == 1:
-        return shrunk(estimate.k, s)
-    k = maps * max(math.ceil(estimate.k / maps), 2)
+        return shrunk(first, s)
+    k = maps * max(math.ceil(first / maps), 2)
     in_each = max(math.ceil(shrunk(k, s)[0] / maps), 2)
     return in_each, s * k / (in_each * maps)
 

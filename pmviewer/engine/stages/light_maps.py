@@ -170,7 +170,7 @@ class MapBuilder:
         """Of a search for k photons, as many as the pass takes."""
         estimate, scene_radius = self.settings.estimate, self.scene.flat.radius
         if estimate.max_radius != "auto":
-            return float(estimate.max_radius) * scene_radius * math.sqrt(k / estimate.k)
+            return float(estimate.max_radius) * scene_radius * math.sqrt(k / self.plan.neighbours)
         automatic = automatic_radius(k, brightest, estimate.black_level)
         return min(max(automatic, estimate.floor * scene_radius), 2 * scene_radius)
 

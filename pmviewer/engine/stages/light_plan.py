@@ -58,6 +58,6 @@ def light_plan(
     if plan.deposition != "all":
         rules = rules_of(settings, plan, importance, index, radii, first.global_)
     normals = plan.radiance or (plan.corners and plan.nearest)
-    neighbours = pass_neighbours(index, estimate, plan.maps)
+    neighbours = pass_neighbours(index, estimate, plan.neighbours, plan.maps)
     kept = index < importance.store.passes
     return LightPlan(index, N, radii, reach, paths, *neighbours, normals, rules, plan.maps, kept)

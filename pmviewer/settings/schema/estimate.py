@@ -207,9 +207,10 @@ class Estimate(Group):
         stage="maps",
         scale="choice",
     )
-    k: int = setting(
-        50,
-        "Photons in a k-nearest estimate of the first pass; later ones take fewer, see alpha.",
+    k: int | Auto = setting(
+        "auto",
+        "Photons in a k-nearest estimate of the first pass; later ones take fewer, see alpha. Automatic: 20, 50 where "
+        "one photon map serves all passes (photons.renew).",
         stage="maps",
         scale="log",
         unit="photons",
