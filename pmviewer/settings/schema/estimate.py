@@ -206,6 +206,7 @@ class Estimate(Group):
         section="Look-up",
         stage="maps",
         scale="choice",
+        title="look-up",
     )
     k: int | Auto = setting(
         "auto",

@@ -7,7 +7,7 @@ import math
 from imgui_bundle import imgui
 
 from pmviewer.engine.energy import ENTRIES, Energy
-from pmviewer.engine.frame import Statistics
+from pmviewer.engine.frame import Frame, Statistics
 from pmviewer.engine.remaining import Remaining
 from pmviewer.viewer import theme
 from pmviewer.viewer.comparison import Point
@@ -151,7 +151,7 @@ class StatisticsPanel:
             return
         imgui.table_next_column()
         table("Photons", photon_rows(s))
-        _maps(s)
+        _maps(frame)
         if s.energy is not None and imgui.tree_node("Energy of a pass"):
             table("", energy_rows(s.energy))
             imgui.tree_pop()
@@ -186,8 +186,16 @@ class StatisticsPanel:
             imgui.text_disabled("None was dropped.")
 
 
-def _maps(s: Statistics) -> None:
+def look_up_radius(frame: Frame, name: str) -> str:
+    """That of the pass by the name of a map, "" without one; look-ups of the nearest photons end before it."""
+    radius = frame.statistics.radius.get(name, 0.0)
+    nearest = frame.automatic.get("estimate.lookup") == "nearest" and name != "volume"
+    return ("≤ " if nearest else "") + si(radius, "m") if radius else ""
+
+
+def _maps(frame: Frame) -> None:
     """A row for each photon map."""
+    s = frame.statistics
     if not s.stored or not imgui.begin_table("##maps", 4):
         return
     imgui.table_setup_column("map", imgui.TableColumnFlags_.width_stretch, 0.8)
@@ -201,11 +209,14 @@ def _maps(s: Statistics) -> None:
         imgui.table_next_row()
         imgui.table_next_column()
         imgui.text_unformatted(name)
-        radius = s.radius.get(name, 0.0)
-        for text in (grouped(count), grouped(s.stored_in_pass.get(name, 0)), si(radius, "m") if radius else "–"):
+        radius = look_up_radius(frame, name) or "–"
+        for text in (grouped(count), grouped(s.stored_in_pass.get(name, 0)), radius):
             imgui.table_next_column()
             _right(text)
-        imgui.set_item_tooltip("Light near edges and on what is smaller is missing until the radius has shrunk.")
+        if "≤" in radius:
+            imgui.set_item_tooltip("Look-ups end at the k-th photon, this far away at most (estimate.max_radius).")
+        else:
+            imgui.set_item_tooltip("Light near edges and on what is smaller is missing until the radius has shrunk.")
     imgui.end_table()
 
 

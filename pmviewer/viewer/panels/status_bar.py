@@ -8,6 +8,7 @@ from pmviewer.engine.frame import Status
 from pmviewer.viewer import theme
 from pmviewer.viewer.background import Work
 from pmviewer.viewer.format import duration, grouped, si
+from pmviewer.viewer.panels.statistics_panel import look_up_radius
 from pmviewer.viewer.panels.widgets import how_many
 from pmviewer.viewer.state import ViewerState
 
@@ -25,9 +26,8 @@ def status_parts(state: ViewerState) -> list[str]:
     parts = [f"pass {grouped(s.passes)}" if not frame.coarse else "coarse"]
     parts.append(f"{si(s.emitted)} emitted")
     parts += [f"{name} {si(count)}" for name, count in s.stored.items()]
-    radius = s.radius.get("global") or next(iter(s.radius.values()), 0.0)
-    if radius:
-        parts.append(f"r {si(radius, 'm')}")
+    radii = (look_up_radius(frame, name) for name in ("global", *s.radius))
+    parts += [f"r {radius}" for radius in radii if radius][:1]
     if s.rays:
         parts.append(f"{si(s.rays_per_second, 'rays/s')}")
     parts.append(duration(s.seconds))
