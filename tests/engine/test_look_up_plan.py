@@ -51,6 +51,18 @@ def test_radii_that_are_asked_for_are_used(wide, by_hand):
     assert plan_of(with_values(Settings(), {**by_hand, "estimate.lookup": "nearest"}), wide.traits).nearest
 
 
+def test_one_map_for_all_passes_is_asked_for_more_neighbours(wide):
+    """No later pass averages its noise out. Who asks for a number gets it."""
+
+    def first(**values: object) -> int:
+        named = {name.replace("__", "."): value for name, value in values.items()}
+        return plan_of(with_values(Settings(), named), wide.traits).neighbours
+
+    assert first() == 20
+    assert first(photons__renew="once") == 50
+    assert first(photons__renew="once", estimate__k=7) == first(estimate__k=7) == 7
+
+
 def test_whoever_flattens_a_scene_knows_it(wide):
     """Such as a worker of a cluster, which gets the scene alone."""
     assert traits_of(wide.flat) == wide.traits

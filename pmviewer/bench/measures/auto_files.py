@@ -44,15 +44,15 @@ CHOSEN = (
     "how wide look-ups are where photons lie far apart with a coated ball, five lamps, a hall, a living room and a "
     "staircase, what fewer photons have to promise with a living room, a staircase, Veach's room and three boxes, "
     "how far look-ups near edges are trusted with the living room, from how many times as many on photons aim at what "
-    "is small with a ship under a dome, a coated torus, rings and two boxes, where the nearest photons are looked up "
-    "with the ship, a coffee pot and four random stages, and what photons shown directly have to promise with all of "
+    "is small with a ship under a dome, a coated torus, rings and two boxes, where the nearest photons are looked up, "
+    "and how many, with the ship, a coffee pot and four random stages, and what photons shown directly have to promise with all of "
     "them"
 )
 """CORNERS, CACHE_CORNERS, LESS_BIAS, MORE_COST, RECORDS, EDGES, SHOWN and NEAREST of `pmviewer.engine.auto.candidates`,
 `pmviewer.render.direct.by_lobes`, HIDDEN of `pmviewer.engine.auto.widths`, `pmviewer.render.adaptive`, GATHERED_ORDER
 and STEADY of `pmviewer.engine.auto.bias`, the powers of `pmviewer.engine.auto.model` and `measured`, HELD and MOST of
-`pmviewer.engine.auto.sparse`, LEAST_GAIN of `pmviewer.photons.projection.aim`, and FEWER_PHOTONS of
-`pmviewer.engine.auto.choose`, said in the targets' own lines."""
+`pmviewer.engine.auto.sparse`, LEAST_GAIN of `pmviewer.photons.projection.aim`, FEWER_PHOTONS of
+`pmviewer.engine.auto.choose`, and NEIGHBOURS of `pmviewer.engine.look_up_plan`, said in the targets' own lines."""
 
 
 def error_against(image: NDArray[Any], references: NDArray[np.float64]) -> float:
