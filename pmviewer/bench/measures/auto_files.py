@@ -45,8 +45,8 @@ CHOSEN = (
     "staircase, what fewer photons have to promise with a living room, a staircase, Veach's room and three boxes, "
     "how far look-ups near edges are trusted with the living room, from how many times as many on photons aim at what "
     "is small with a ship under a dome, a coated torus, rings and two boxes, where the nearest photons are looked up, "
-    "and how many, with the ship, a coffee pot and four random stages, and what photons shown directly have to promise with all of "
-    "them"
+    "and how many, with the ship, a coffee pot and four random stages, and what photons shown directly have to promise "
+    "with all of them"
 )
 """CORNERS, CACHE_CORNERS, LESS_BIAS, MORE_COST, RECORDS, EDGES, SHOWN and NEAREST of `pmviewer.engine.auto.candidates`,
 `pmviewer.render.direct.by_lobes`, HIDDEN of `pmviewer.engine.auto.widths`, `pmviewer.render.adaptive`, GATHERED_ORDER
