@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
-from pmviewer.engine.look_up_plan import estimator_of, first_neighbours, reaches_to_nearest
+from pmviewer.engine.look_up_plan import NEIGHBOURS, estimator_of, first_neighbours, reaches_to_nearest
 from pmviewer.engine.media_plan import BLURRED, BLURRED_FROM, THIN, in_media
 from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.render.camera import are_hidden
@@ -86,7 +86,7 @@ class Plan:
     emission: Emission = "off"
     convergence: int = 0
     nearest: bool = False
-    neighbours: int = 0
+    neighbours: int = NEIGHBOURS
     lens: bool = False
     filtered: bool = False
     moments: bool = True
