@@ -33,6 +33,10 @@ SMALL = 0.5
 """Most radius of what stands there, relative to that of all."""
 
 
+AT_ONCE = 1 << 16
+"""Triangles that are looked at together."""
+
+
 class Small(NamedTuple):
     """A sphere around all but the floor."""
 
@@ -50,16 +54,14 @@ class _Sheets(NamedTuple):
 def small_of(scene: Scene, radius: float) -> Small | None:
     """What stands on a scene's floor or under a dome, the scene having that bounding sphere; None where neither reaches
     much farther."""
-    triangles: dict[int, Float] = {}
     found = None
-    while (smaller := _without_floor(scene, radius, triangles)) is not None:
+    while (smaller := _without_floor(scene, radius)) is not None:
         found, radius = smaller, smaller.radius
     return found
 
 
-def _without_floor(scene: Scene, radius: float, triangles: dict[int, Float]) -> Small | None:
-    """What is left without surfaces that are wide within that radius. `triangles`: corners (n, 3, 3) of meshes that
-    have been looked at, by their objects' numbers."""
+def _without_floor(scene: Scene, radius: float) -> Small | None:
+    """What is left without surfaces that are wide within that radius."""
     wide = 2 * WIDE * radius
     lows, highs, sheets, balls = [], [], [], []
     for shape in scene.shapes:
@@ -69,15 +71,8 @@ def _without_floor(scene: Scene, radius: float, triangles: dict[int, Float]) -> 
         if np.linalg.norm(high - low) > wide:
             low = high = np.zeros((0, 3))
             if isinstance(shape.geometry, Mesh):
-                mesh = shape.geometry
-                if id(mesh) not in triangles:
-                    triangles[id(mesh)] = mesh.vertices[mesh.faces].astype(float)
-                corners = triangles[id(mesh)]
-                a, b, c = corners.transpose(1, 0, 2)
-                low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
-                large = np.linalg.norm(high - low, axis=1) > wide
-                sheets.append(_sheets_of(corners[large]))
-                low, high = low[~large], high[~large]
+                low, high, large = _narrow_part(shape.geometry, wide)
+                sheets.append(_sheets_of(large))
             elif isinstance(shape.geometry, Sphere):
                 balls.append(shape.geometry)
             elif (sheet := _sheet_of(shape.geometry)) is not None:
@@ -98,6 +93,25 @@ def _without_floor(scene: Scene, radius: float, triangles: dict[int, Float]) -> 
     if not 0 < around <= SMALL * radius or any(ball.radius < ROUND * around for ball in balls):
         return None
     return None if _face_each_other(sheets, balls, center) else Small(center, around)
+
+
+def _narrow_part(mesh: Mesh, wide: float) -> tuple[Float, Float, Float]:
+    """The box, as (0 or 1, 3) corners, around a mesh's triangles of no more than that width, and corners (n, 3, 3) of
+    the wider ones. A part at a time: all corners of a large mesh are larger than the mesh."""
+    lows, highs, large = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros((0, 3, 3))]
+    for first in range(0, len(mesh.faces), AT_ONCE):
+        corners = mesh.vertices[mesh.faces[first : first + AT_ONCE]].astype(float)
+        a, b, c = corners.transpose(1, 0, 2)
+        low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+        wider = ((high - low) ** 2).sum(axis=1) > wide * wide
+        large.append(corners[wider])
+        if not wider.all():
+            lows.append(low[~wider].min(axis=0, keepdims=True))
+            highs.append(high[~wider].max(axis=0, keepdims=True))
+    lowest, highest, wider_ones = (np.concatenate(parts) for parts in (lows, highs, large))
+    if not len(lowest):
+        return lowest, highest, wider_ones
+    return lowest.min(axis=0, keepdims=True), highest.max(axis=0, keepdims=True), wider_ones
 
 
 def _face_each_other(sheets: list[_Sheets], balls: list[Sphere], center: Float) -> bool:
