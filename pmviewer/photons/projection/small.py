@@ -98,20 +98,22 @@ def _without_floor(scene: Scene, radius: float) -> Small | None:
 def _narrow_part(mesh: Mesh, wide: float) -> tuple[Float, Float, Float]:
     """The box, as (0 or 1, 3) corners, around a mesh's triangles of no more than that width, and corners (n, 3, 3) of
     the wider ones. A part at a time: all corners of a large mesh are larger than the mesh."""
-    lows, highs, large = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros((0, 3, 3))]
+    vertices = np.ascontiguousarray(mesh.vertices.T)
+    lows, highs, large = [np.zeros((3, 0))], [np.zeros((3, 0))], [np.zeros((0, 3, 3))]
     for first in range(0, len(mesh.faces), AT_ONCE):
-        corners = mesh.vertices[mesh.faces[first : first + AT_ONCE]].astype(float)
-        a, b, c = corners.transpose(1, 0, 2)
-        low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
-        wider = ((high - low) ** 2).sum(axis=1) > wide * wide
-        large.append(corners[wider])
-        if not wider.all():
-            lows.append(low[~wider].min(axis=0, keepdims=True))
-            highs.append(high[~wider].max(axis=0, keepdims=True))
-    lowest, highest, wider_ones = (np.concatenate(parts) for parts in (lows, highs, large))
-    if not len(lowest):
-        return lowest, highest, wider_ones
-    return lowest.min(axis=0, keepdims=True), highest.max(axis=0, keepdims=True), wider_ones
+        corners = np.take(vertices, mesh.faces[first : first + AT_ONCE].T, axis=1)  # (axes, corners, triangles)
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        wider = ((high - low) ** 2).sum(axis=0) > wide * wide
+        if wider.any():
+            large.append(corners[:, :, wider].transpose(2, 1, 0))
+            low, high = low[:, ~wider], high[:, ~wider]
+        if low.size:
+            lows.append(low.min(axis=1, keepdims=True))
+            highs.append(high.max(axis=1, keepdims=True))
+    lowest, highest = np.concatenate(lows, axis=1), np.concatenate(highs, axis=1)
+    if lowest.size:
+        lowest, highest = lowest.min(axis=1, keepdims=True), highest.max(axis=1, keepdims=True)
+    return lowest.T.astype(float), highest.T.astype(float), np.concatenate(large).astype(float)
 
 
 def _face_each_other(sheets: list[_Sheets], balls: list[Sphere], center: Float) -> bool:
