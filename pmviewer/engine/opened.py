@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from pmviewer.engine.auto.bias import Bias
 from pmviewer.engine.memory import check_scene_memory
 from pmviewer.engine.stages.hidden_lights import hidden_lights
 from pmviewer.photons.projection.aim import may_aim
-from pmviewer.photons.projection.projection import Projection, aims
+from pmviewer.photons.projection.projection import Projection, aimed
 from pmviewer.scene.analysis import SceneTraits, analyse
 from pmviewer.scene.arrays.covered_emission import ignored_opacity, without_unseen_lights
 from pmviewer.scene.arrays.flatten import FlatScene, bounding_sphere, flatten
@@ -30,6 +31,8 @@ from pmviewer.settings.edits import Edits
 OnType = Callable[[np.dtype, SceneTraits], None]
 """Hears, while a scene is being opened, of what type its record will be and what is in it."""
 
+BY_DEFAULT = ("auto", False)
+"""The key of projection maps as settings have them by default: no trajectories for the caustic map alone."""
 _uids = itertools.count(1)
 
 
@@ -120,10 +123,17 @@ def is_edited(before: OpenScene | None, after: OpenScene) -> bool:
     return before is not None and before.whole is after.whole
 
 
-def traits_of(flat: FlatScene) -> SceneTraits:
-    """With what only the flattened scene tells."""
-    traits = analyse(flat.owner)
-    return replace(traits, aims=aims(flat, not traits.lit_media))
+def expected_traits(scene: Scene) -> SceneTraits:
+    """Of a scene that isn't flattened yet. Photons that may aim do so unless lights' own maps spare as many."""
+    return replace(analyse(scene), aims=may_aim(scene, bounding_sphere(scene)[1]))
+
+
+def opened_of(scene: Scene, flat: FlatScene, expected: SceneTraits, source: str, **more: Any) -> OpenScene:
+    """The flattened scene, of which those traits were expected, with `more` fields. Maps that tell whether photons aim
+    are kept for the light pass."""
+    made = aimed(flat, confined=not expected.lit_media) if expected.aims else None
+    traits = replace(expected, aims=made is not None)
+    return OpenScene(scene, flat, traits, source, projections={} if made is None else {BY_DEFAULT: made}, **more)
 
 
 def _opened(
@@ -138,11 +148,9 @@ def _opened(
     scene = edited(whole, arrangement.edits)
     check_scene_memory(scene)
     scene = without_unseen_lights(recentred(scene))
-    traits = analyse(scene)
-    traits = replace(traits, aims=may_aim(scene, bounding_sphere(scene)[1]))
+    traits = expected_traits(scene)
     flat = flatten(scene, lambda of_record: on_type(of_record, traits), like, ahead=ahead)
-    traits = replace(traits, aims=traits.aims and aims(flat, not traits.lit_media))
     said = (*hidden_lights(scene, flat), *ignored_opacity(scene), *flat.said)
     if said:
         scene = replace(scene, warnings=(*scene.warnings, *said))
-    return OpenScene(scene, flat, traits, source, content=content, whole=whole, arrangement=arrangement)
+    return opened_of(scene, flat, traits, source, content=content, whole=whole, arrangement=arrangement)

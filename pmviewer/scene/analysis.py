@@ -76,7 +76,7 @@ class SceneTraits:
     """Surfaces that reflect and refract as deltas."""
     aims: bool = False
     """Something is so small on a wide stage that photons aim at it (`pmviewer.photons.projection.aim`). `analyse`
-    doesn't tell."""
+    doesn't tell, `pmviewer.engine.opened` does."""
 
     @property
     def lit_media(self) -> bool:

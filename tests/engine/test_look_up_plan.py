@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.method import plan_of
-from pmviewer.engine.opened import OpenScene, open_scene, traits_of
+from pmviewer.engine.opened import OpenScene, expected_traits, open_scene, opened_of
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.series.keys import orbits, with_one_radius
 from pmviewer.engine.stages.projection import projection_for
@@ -65,7 +65,8 @@ def test_one_map_for_all_passes_is_asked_for_more_neighbours(wide):
 
 def test_whoever_flattens_a_scene_knows_it(wide):
     """Such as a worker of a cluster, which gets the scene alone."""
-    assert traits_of(wide.flat) == wide.traits
+    scene = wide.flat.owner
+    assert opened_of(scene, wide.flat, expected_traits(scene), "").traits == wide.traits
     assert wide.traits.aims
 
 

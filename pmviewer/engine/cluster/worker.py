@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 
 from pmviewer.engine.cluster.packed import PackedIncrement, pack
 from pmviewer.engine.cluster.shared_memory import Handle, Writer, Written
-from pmviewer.engine.opened import OpenScene, traits_of
+from pmviewer.engine.opened import OpenScene, expected_traits, opened_of
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.store import StageStore
@@ -208,7 +208,7 @@ def _opened(payload: bytes) -> tuple[OpenScene, str]:
 
     scene, source = pickle.loads(decompress(payload))
     flat = flatten(scene)
-    return OpenScene(scene, flat, traits_of(flat), source), digest_of(flat)
+    return opened_of(scene, flat, expected_traits(scene), source), digest_of(flat)
 
 
 def _kept(held: OrderedDict[Any, T], key: Any, most: int, make: Callable[[], T]) -> T:

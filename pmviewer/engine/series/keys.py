@@ -94,6 +94,7 @@ def with_one_radius(opened: OpenScene, settings: Sequence[Settings]) -> list[Set
     first = mean_radii(radii)
 
     def with_radius(one: Settings) -> Settings:
+        # A radius by hand would be used for look-ups of the nearest photons; it is for those in media.
         kept = {"estimate.lookup": "nearest"} if plan_of(one, opened.traits).nearest else {}
         return with_values(one, {**first.values(one.estimate), **kept})
 

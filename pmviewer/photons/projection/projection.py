@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.photons.projection.aim import LEAST_GAIN, aim_of, may_aim, standing
+from pmviewer.photons.projection.aim import LEAST_GAIN, aim_of, standing
 from pmviewer.photons.projection.bounds import enclosing, spheres_of
 from pmviewer.photons.projection.light_map import (
     MODES,
@@ -117,9 +117,11 @@ def projection_of(
     return Projection(records, tuple(arrays), surfaces, caustic, surface_power, caustic_power, covered, most_gain)
 
 
-def aims(scene: FlatScene, confined: bool = True) -> bool:
-    """Whether photons aim at what is small in such a scene."""
-    return may_aim(scene.owner, scene.radius) and projection_of(scene, False, True, confined).gain > 1.0
+def aimed(scene: FlatScene, confined: bool = True) -> Projection | None:
+    """The maps by default, without trajectories for the caustic map alone, of a scene whose photons aim at what is
+    small; None of others. What makes caustics is a part of all surfaces: its photons aim nowhere else."""
+    made = projection_of(scene, always=False, with_caustics=False, confined=confined)
+    return made if made.gain > 1.0 else None
 
 
 _CELLED = ("directions", "places", "world directions")
