@@ -4,6 +4,7 @@ import json
 import math
 import re
 import struct
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from PIL import Image
 from pmviewer.bench import peer
 from pmviewer.bench.files import bench
 from pmviewer.bench.files.judge import Row
-from pmviewer.bench.files.mitsuba_file import as_of_3, noise, small_size
+from pmviewer.bench.files.mitsuba_file import as_of_3, by_extinction, noise, small_size
 from pmviewer.bench.files.sheet import contact_sheet, write_sheet
 from pmviewer.bench.files.store import Store
 from pmviewer.bench.files.survey import STATES, candidates, survey, surveys
@@ -225,6 +226,31 @@ def test_a_folder_that_is_none_is_refused_in_words(tmp_path):
             bench.run(folder)
     with pytest.raises(SettingError, match="no complete scene file"):
         bench.run(tmp_path)
+
+
+MEDIUM = (
+    '<medium type="homogeneous" id="fog"><rgb name="sigmaA" value="1 3 2"/><rgb name="sigmaS" value="1 1 6"/></medium>'
+)
+CLOUD = '<shape type="sphere">{}<ref name="interior" id="fog"/></shape>'
+
+
+def test_mitsuba_gets_clear_boundaries_of_old_files_media():
+    """Before version 2 a shape with a medium and no BSDF lets light pass; in Mitsuba 3 it would be diffuse."""
+    old = f'<scene version="0.5.0">{MEDIUM}{CLOUD.format("")}</scene>'
+    assert as_of_3(old).count('<bsdf type="null"') == 1
+    assert 'type="null"' not in as_of_3(old.replace("0.5.0", "3.0.0"))
+    glass = f'<bsdf type="dielectric" id="g"/>{CLOUD.format("""<ref id="g"/>""")}'
+    assert 'type="null"' not in as_of_3(f'<scene version="0.6.0">{MEDIUM}{glass}</scene>')
+
+
+def test_mitsuba_gets_extinction_and_albedo_of_old_files_media():
+    """Absorption and scattering of 1, 3, 2 and 1, 1, 6: extinction 2, 4, 8, of which a half, a quarter, three quarters
+    scatter. Mitsuba 3 takes no colour above one, so the rest of it is in the scale."""
+    props = {"sigma_a": (1, 3, 2), "sigma_s": (1, 1, 6), "scale": 0.5}
+    by_extinction(SimpleNamespace(ScalarColor3f=np.array), props)
+    assert sorted(props.keys()) == ["albedo", "scale", "sigma_t"]
+    assert np.array(props["sigma_t"]) * props["scale"] == pytest.approx([1, 2, 4])
+    assert np.array(props["albedo"]) == pytest.approx([0.5, 0.25, 0.75])
 
 
 def test_mitsuba_gets_colours_of_old_files_in_linear_numbers():

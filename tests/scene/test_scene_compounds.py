@@ -173,6 +173,27 @@ def test_plugins_of_others_are_read_as_what_they_are_called_after(tmp_path: Path
     assert (found.kind, found.two_sided, len(warnings)) == ("conductor", True, 1)
 
 
+def test_disneys_bsdf_by_the_names_of_others(tmp_path: Path) -> None:
+    """As in a renderer for teaching: lobes on their own, and `specular` as a share of what the index reflects."""
+    number = '<float name="{}" value="{}"/>'.format
+    colour = '<rgb name="baseColor" value="0.8 0.6 0.1"/>'
+    diffuse, _ = material(tmp_path, f'<bsdf type="disneydiffuse">{colour}{number("subsurface", 0.5)}</bsdf>')
+    assert (diffuse.reflectance, diffuse.eta) == (pytest.approx((0.8, 0.6, 0.1)), 1)
+    assert diffuse.principled.flatness == 0.5
+    for name, lobe in {"disneymetal": "metallic", "disneyglass": "spec_trans"}.items():
+        found, warnings = material(tmp_path, f'<bsdf type="{name}">{colour}{number("anisotropic", 0.8)}</bsdf>')
+        assert getattr(found.principled, lobe) == 1
+        assert found.alpha[0] > found.alpha[1]
+        assert len(warnings) == 1
+    rest = number("specular", 0.5) + number("eta", 1.5) + number("specularTint", 0.25)
+    whole, warnings = material(tmp_path, f'<bsdf type="disneybsdf">{rest}</bsdf>')
+    assert ((whole.eta - 1) / (whole.eta + 1)) ** 2 == pytest.approx(0.5 * 0.04)
+    assert whole.principled.spec_tint == 0.25
+    assert len(warnings) == 1
+    glass, _ = material(tmp_path, f'<bsdf type="disneybsdf">{rest}{number("specularTransmission", 0.5)}</bsdf>')
+    assert (glass.eta, glass.principled.spec_trans) == (1.5, 0.5)
+
+
 @pytest.mark.parametrize("exponent", [20.0, 300.0])
 def test_phongs_lobe_has_wards_width(tmp_path: Path, exponent: float) -> None:
     """Where cosⁿ δ about the mirror direction is a half, exp(−tan²(δ/2)/α²) about the half vector is too."""

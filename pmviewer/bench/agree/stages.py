@@ -9,6 +9,9 @@ from pmviewer.bench.agree.tree import Node
 
 FARTHEST = 5e3
 """Most width of the floor, in the scene's own units: Mitsuba's cameras see 10,000 far."""
+FOLLOWED = ("metal only", "glass only", "no diffuse")
+"""Profiles whose mirrors show the dome everywhere: of what it reflects itself a look-up as narrow as what stands there
+meets one photon in 200,000, and all light from there is missing until one has come."""
 
 
 def stage(draw: Draw, scene: Node, surroundings: int, half: float) -> None:
@@ -27,6 +30,8 @@ def stage(draw: Draw, scene: Node, surroundings: int, half: float) -> None:
         dome = {"type": "sphere", "to_world": [["scale", 3 * [2.5 * wide]]], "flip_normals": True}
         shine = {"type": "area", "radiance": draw.colour(0.2, 1.0)}
         bsdf = {"type": "diffuse", "reflectance": draw.colour(0.0, 0.5)}
+        if scene["profile"] in FOLLOWED:
+            bsdf["reflectance"] = 3 * [0.0]
     else:
         size, place = wide * draw.number(0.2, 0.5), [wide * draw.number(-0.3, 0.3), 0.0, wide]
         down = [["scale", [size, size, 1.0]], ["rotate", [1.0, 0.0, 0.0], 180.0], ["translate", place]]

@@ -3,7 +3,8 @@
 Runs inside `pmviewer.bench.agree.mitsuba_server`. The file's film gets another size, its integrator is replaced by the
 path tracer, and smooth surfaces of files with blends become a little rough (`ROUGH`). A file that Mitsuba refuses then
 is tried again with properties that nothing reads ignored, with <lookAt>, as it was written before 0.5, and with 0.6's
-<srgb> and texture filters by their nearest equivalents. What was changed beyond that is told.
+<srgb>, texture filters, coefficients of media and shapes without a BSDF by their nearest equivalents. What was changed
+beyond that is told.
 """
 
 from __future__ import annotations
@@ -13,8 +14,10 @@ import re
 import time
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
+from numpy.typing import NDArray
 
 CHUNK = 16
 """Samples per pixel between two looks at the noise: chunks are the independent pictures that the noise is taken of."""
@@ -137,7 +140,25 @@ def _parsed(mi: Any, config: Any, path: Path, lenient: bool) -> Any:
 def as_of_3(text: str) -> str:
     """A scene file's text with elements of older versions as Mitsuba 3 has them."""
     text = re.sub(r"<(/?)lookAt\b", r"<\1lookat", text)
-    return re.sub(r'<srgb\b([^>]*?)value="([^"#]*)"', _linear, text)
+    return _unseen_boundaries(re.sub(r'<srgb\b([^>]*?)value="([^"#]*)"', _linear, text))
+
+
+def _unseen_boundaries(text: str) -> str:
+    """Shapes that bound a medium and have no BSDF let light pass before version 2; in Mitsuba 3 they are diffuse."""
+    try:
+        root = ElementTree.fromstring(text.encode())
+    except ElementTree.ParseError:
+        return text
+    if int(root.get("version", "3").split(".")[0]) >= 2:
+        return text
+    bsdfs = {node.get("id") for node in root.iter("bsdf")}
+    bounds = [
+        shape for shape in root.iter("shape") if any(node.get("name") in ("interior", "exterior") for node in shape)
+    ]
+    for shape in bounds:
+        if not any(node.tag == "bsdf" or (node.tag == "ref" and node.get("id") in bsdfs) for node in shape):
+            ElementTree.SubElement(shape, "bsdf", {"type": "null"})
+    return ElementTree.tostring(root, "unicode") if bounds else text
 
 
 def _linear(found: re.Match[str]) -> str:
@@ -166,11 +187,29 @@ def _adapt(mi: Any, state: Any, longest: int, lenient: bool) -> dict[str, Any]:
             node.props = mi.Properties("path")
         elif node.type == mi.ObjectType.Sampler:
             node.props = mi.Properties("independent")
+        elif lenient and props.plugin_name() == "homogeneous" and {"sigma_a", "sigma_s"} <= set(props.keys()):
+            by_extinction(mi, props)
         elif lenient and node.type == mi.ObjectType.Texture:
             for key in ("filter_type", "filterType"):
                 if key in props and props[key] in FILTERS:
                     props[key] = FILTERS[props[key]]
     return about
+
+
+def by_extinction(mi: Any, props: Any) -> None:
+    """A medium's coefficients as Mitsuba 3 knows them, where 0.6 has absorption and scattering, all of one kind."""
+
+    def colour(value: Any) -> NDArray[np.float64]:
+        return np.array(value.values if hasattr(value, "wavelengths") else value, float) * np.ones(3)
+
+    absorbed, scattered = (colour(props[name]) for name in ("sigma_a", "sigma_s"))
+    extinction = absorbed + scattered
+    for name in ("sigma_a", "sigma_s"):
+        del props[name]
+    densest = max(float(extinction.max()), 1e-30)
+    props["scale"] = densest * (float(props["scale"]) if "scale" in props else 1.0)
+    props["sigma_t"] = mi.ScalarColor3f(extinction / densest)  # colours of more than 1 are refused
+    props["albedo"] = mi.ScalarColor3f(np.divide(scattered, extinction, out=np.zeros(3), where=extinction > 0))
 
 
 def _resized(mi: Any, node: Any, longest: int) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pmviewer.scene.description import BLACK, RGB, THIN_GLASS, Material, ThinGlass
 from pmviewer.scene.formats.mitsuba import older
 from pmviewer.scene.formats.mitsuba.compound import blend, mask, mixture, two_sided
+from pmviewer.scene.formats.mitsuba.disney import PARTS, as_principled
 from pmviewer.scene.formats.mitsuba.document import Document, Properties
 from pmviewer.scene.formats.mitsuba.glass import dispersing
 from pmviewer.scene.formats.mitsuba.interface import alpha, alphas, bounded, distribution, relative_ior
@@ -21,7 +22,7 @@ _AROUND_ONE = frozenset(("twosided", "mask", "bumpmap", "bump", "normalmap", "co
 _COMPOUND = _AROUND_ONE | {"blendbsdf", "mixturebsdf"}
 _GREY = (0.5, 0.5, 0.5)
 _ELSEWHERE = {"glass": "dielectric", "mirror": "conductor", "lambertian": "diffuse", "matte": "diffuse",
-              "disney": "principled", "disneybsdf": "principled"}  # fmt: skip
+              "disney": "principled", "disneybsdf": "principled", **dict.fromkeys(PARTS, "principled")}  # fmt: skip
 """Types of other renderers that read Mitsuba's format."""
 
 
@@ -102,6 +103,8 @@ class Materials:
         )
         if known != p.type:
             self.document.warn(f"{p.element} is not supported: it is read as '{known}'.", p.element)
+        if word.startswith("disney") and known == "principled":
+            as_principled(p, word)
         return known
 
 
