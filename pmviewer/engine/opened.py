@@ -13,6 +13,7 @@ import numpy as np
 from pmviewer.engine.auto.bias import Bias
 from pmviewer.engine.memory import check_scene_memory
 from pmviewer.engine.stages.hidden_lights import hidden_lights
+from pmviewer.engine.stages.sky_seen import SeenSky, seen_sky, sees_as
 from pmviewer.photons.projection.aim import may_aim
 from pmviewer.photons.projection.projection import Projection, aimed
 from pmviewer.scene.analysis import SceneTraits, analyse
@@ -73,6 +74,8 @@ class OpenScene:
     biases: dict[Hashable, Bias] = field(default_factory=dict, compare=False, repr=False)
     """What trials have measured, by the way of rendering (`pmviewer.engine.auto.bias.way_of`)."""
     projections: dict[tuple[str, bool], Projection | None] = field(default_factory=dict, compare=False, repr=False)
+    seen_sky: SeenSky | None = field(default=None, compare=False, repr=False)
+    """Which part of the sky is seen from where, for as long as the record points there."""
 
     def is_arranged(self, arrangement: Arrangement) -> bool:
         """Is it arranged like that? A scene that was no file has no other lights than its own."""
@@ -113,7 +116,7 @@ def rearranged(opened: OpenScene, arrangement: Arrangement) -> OpenScene:
     assert whole is not None
     if opened.content is None or arrangement.rig == opened.arrangement.rig:
         arrangement = replace(arrangement, rig=opened.arrangement.rig)
-        again = _opened(whole, opened.source, opened.content, arrangement, like=opened.flat)
+        again = _opened(whole, opened.source, opened.content, arrangement, like=opened)
         return replace(again, exposures=opened.exposures)  # edits shall be seen, not adapted to
     return _opened(completed(opened.content, arrangement.rig), opened.source, opened.content, arrangement)
 
@@ -128,12 +131,18 @@ def expected_traits(scene: Scene) -> SceneTraits:
     return replace(analyse(scene), aims=may_aim(scene, bounding_sphere(scene)[1]))
 
 
-def opened_of(scene: Scene, flat: FlatScene, expected: SceneTraits, source: str, **more: Any) -> OpenScene:
+def opened_of(
+    scene: Scene, flat: FlatScene, expected: SceneTraits, source: str, like: OpenScene | None = None, **more: Any
+) -> OpenScene:
     """The flattened scene, of which those traits were expected, with `more` fields. Maps that tell whether photons aim
-    are kept for the light pass."""
+    are kept for the light pass. What is seen of the sky may be as in the scene `like` it."""
     made = aimed(flat, confined=not expected.lit_media) if expected.aims else None
     traits = replace(expected, aims=made is not None)
-    return OpenScene(scene, flat, traits, source, projections={} if made is None else {BY_DEFAULT: made}, **more)
+    seen = like.seen_sky if like is not None and sees_as(flat, like.flat) else seen_sky(scene, flat)
+    if seen is not None:
+        seen.store(flat.record[0])
+    maps: dict[tuple[str, bool], Projection | None] = {} if made is None else {BY_DEFAULT: made}
+    return OpenScene(scene, flat, traits, source, projections=maps, seen_sky=seen, **more)
 
 
 def _opened(
@@ -142,15 +151,17 @@ def _opened(
     content: Scene | None,
     arrangement: Arrangement,
     on_type: OnType = nobody,
-    like: FlatScene | None = None,
+    like: OpenScene | None = None,
     ahead: TreeAhead | None = None,
 ) -> OpenScene:
     scene = edited(whole, arrangement.edits)
     check_scene_memory(scene)
     scene = without_unseen_lights(recentred(scene))
     traits = expected_traits(scene)
-    flat = flatten(scene, lambda of_record: on_type(of_record, traits), like, ahead=ahead)
+    flat = flatten(
+        scene, lambda of_record: on_type(of_record, traits), None if like is None else like.flat, ahead=ahead
+    )
     said = (*hidden_lights(scene, flat), *ignored_opacity(scene), *flat.said)
     if said:
         scene = replace(scene, warnings=(*scene.warnings, *said))
-    return opened_of(scene, flat, traits, source, content=content, whole=whole, arrangement=arrangement)
+    return opened_of(scene, flat, traits, source, like, content=content, whole=whole, arrangement=arrangement)

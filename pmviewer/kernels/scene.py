@@ -58,6 +58,9 @@ LIGHT_FIELDS: list[tuple[str, str]] = [
     ("sky_guide", "i8"),  # int32 (sky_height − 1, sky_steps): where in a row of cells to look for a number
     ("sky_steps", "i8"),
     ("sky_facings", "i8"),  # float32: how surfaces sample it, see `pmviewer.kernels.lights.sky_facing`; 0 without one
+    ("sky_frame", "i8"),  # float32 (4,): where cubes begin, and how many there are to a unit of length; 0 without them
+    ("sky_cubes", "i8"),  # int32 (CUBES, CUBES, CUBES) by z, y, x: number of a cube's tables, −1 for none
+    ("sky_seen", "i8"),  # float32: how surfaces in cubes sample it, see `pmviewer.kernels.lights.sky_seen`
     ("sky_width", "i8"),
     ("sky_height", "i8"),
 ]

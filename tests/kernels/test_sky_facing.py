@@ -12,7 +12,8 @@ import pytest
 
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.lights.light import environment_radiance, sample_one_light
-from pmviewer.kernels.lights.sky_facing import FACINGS, FLOOR, SIDE, TABLE, facing_sky, place_on_light, seen_light_pdf
+from pmviewer.kernels.lights.sky_facing import FACINGS, FLOOR, facing_sky, place_on_light, seen_light_pdf
+from pmviewer.kernels.lights.sky_seen import SIDE, TABLE
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import SOBOL, draw4
 from pmviewer.render.direct.choice import LIST_WORDS, choose_by_power
@@ -68,7 +69,7 @@ def _drawn(scenes, n, wi, f, pdf, seen):
     scene = scenes[0]
     zero = (np.float32(0.0), np.float32(0.0), np.float32(0.0))
     n = (n[0], n[1], n[2])
-    choice = facing_sky(scene, choose_by_power(stack_i4(LIST_WORDS), 1), n, n)
+    choice = facing_sky(scene, choose_by_power(stack_i4(LIST_WORDS), 1), zero, n, n)
     sky = scene.environment
     for i in range(len(wi)):
         u, v, _, _ = draw4(SOBOL, np.uint32(7), np.uint32(i), np.int64(3))
@@ -84,7 +85,7 @@ def _seen(scenes, n, wi, f, pdf):
     scene = scenes[0]
     zero = (np.float32(0.0), np.float32(0.0), np.float32(0.0))
     n = (n[0], n[1], n[2])
-    choice = facing_sky(scene, choose_by_power(stack_i4(LIST_WORDS), 1), n, n)
+    choice = facing_sky(scene, choose_by_power(stack_i4(LIST_WORDS), 1), zero, n, n)
     for i in range(len(wi)):
         d = (wi[i, 0], wi[i, 1], wi[i, 2])
         L = environment_radiance(scene, d)
@@ -161,7 +162,7 @@ def test_tables_are_cumulative_and_leave_nothing_out():
 @kernel
 def _table(scenes, ng, ns, found):
     ng, ns = (ng[0], ng[1], ng[2]), (ns[0], ns[1], ns[2])
-    found[0] = facing_sky(scenes[0], choose_by_power(stack_i4(LIST_WORDS), 1), ng, ns)[5]
+    found[0] = facing_sky(scenes[0], choose_by_power(stack_i4(LIST_WORDS), 1), ng, ng, ns)[5]
 
 
 def test_a_shading_normal_behind_the_surface_stands_for_the_side_that_is_seen():

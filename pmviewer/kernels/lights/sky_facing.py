@@ -7,7 +7,7 @@ into cells by these shares, row by row and column by column, so that well-spread
 of a direction is that of the image times the share of its cell over 1/SIDE². A part FLOOR of the shares is the same for
 all cells: nothing that a lobe may reflect is left out, and no sample counts for more than cos/FLOOR times the mean.
 There is a table for each of FACINGS × FACINGS cells of an octahedral map of normals
-(`pmviewer.scene.arrays.sky_facing`).
+(`pmviewer.scene.arrays.sky_facing`), and others where little of the sky is seen (`pmviewer.kernels.lights.sky_seen`).
 """
 
 from __future__ import annotations
@@ -18,47 +18,34 @@ from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.lights.environment import cell_of_square, image_pdf
 from pmviewer.kernels.lights.light import one_light_pdf
+from pmviewer.kernels.lights.sky_seen import SIDE, TABLE, facing_cell, seen_table
 from pmviewer.kernels.memory import load_f4
 from pmviewer.kernels.table import find_interval
 from pmviewer.kernels.vector import dot, scale
 
-SIDE = 16
 FACINGS = 16
 FLOOR = 0.05
-TABLE = SIDE + SIDE * SIDE
-"""Numbers of a table: cumulative shares of its rows, then of the cells within each."""
 
 _f4 = np.float32
 _i8 = np.int64
 _LAST = _f4(0.99999994)
 
 
-@device
-def _facing_cell(n):
-    """Number of the cell of the octahedral map that the unit vector n lies in."""
-    inv = _f4(1.0) / (abs(n[0]) + abs(n[1]) + abs(n[2]))
-    x, y = n[0] * inv, n[1] * inv
-    if n[2] < _f4(0.0):
-        a, b = _f4(1.0) - abs(y), _f4(1.0) - abs(x)
-        x, y = a if x >= _f4(0.0) else -a, b if y >= _f4(0.0) else -b
-    half = _f4(0.5 * FACINGS)
-    i = min(max(_i8((x + _f4(1.0)) * half), _i8(0)), _i8(FACINGS - 1))
-    j = min(max(_i8((y + _f4(1.0)) * half), _i8(0)), _i8(FACINGS - 1))
-    return j * _i8(FACINGS) + i
-
-
 @specialised
-def facing_sky(scene, choice, ng, ns):
-    """The choice of lights (`pmviewer.render.direct.choice`) of a surface whose lobes reflect light from the side of
-    its geometric normal ng: the sky is sampled for that, by cosines with the shading normal ns or −ns."""
+def facing_sky(scene, choice, p, ng, ns):
+    """The choice of lights (`pmviewer.render.direct.choice`) of a surface at p whose lobes reflect light from the side
+    of its geometric normal ng: the sky is sampled for that, by cosines with the shading normal ns or −ns."""
     if not has(scene, "more_lights"):
-        return lambda scene, choice, ng, ns: choice
+        return lambda scene, choice, p, ng, ns: choice
 
-    def facing(scene, choice, ng, ns):
+    def facing(scene, choice, p, ng, ns):
         lights, known, mass, rest, samples, table = choice
         if scene.sky_facings != 0:
             side = _f4(-1.0) if dot(ng, ns) < _f4(0.0) else _f4(1.0)
-            table = scene.sky_facings + _facing_cell(scale(ns, side)) * _i8(4 * TABLE)
+            n = scale(ns, side)
+            table = seen_table(scene, p, n)
+            if table == 0:
+                table = scene.sky_facings + facing_cell(n, FACINGS) * _i8(4 * TABLE)
         return lights, known, mass, rest, samples, table
 
     return facing

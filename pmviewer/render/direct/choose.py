@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED, is_lambertian, shading_normal
+from pmviewer.kernels.bsdf.scattering import FOLLOWED, STORED, is_lambertian, shading_normal, transmits
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import specialised
 from pmviewer.kernels.lights.reach import samples_by_power_suffice
@@ -38,8 +38,8 @@ def _for_lobes(scene, si, group, choice):
     """The choice that a rule has made, by what the lobes reflect of lights and of the sky."""
     if group == FOLLOWED or not is_lambertian(si.bsdf):
         choice = choose_by_lobes(scene, si, group, choice)
-    if group == STORED:
-        choice = facing_sky(scene, choice, si.ng, shading_normal(si.bsdf))
+    if group == STORED or not transmits(si.bsdf):
+        choice = facing_sky(scene, choice, si.p, si.ng, shading_normal(si.bsdf))
     return choice
 
 
