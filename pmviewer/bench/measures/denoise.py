@@ -1,25 +1,27 @@
 """Error against time of denoised pictures, the denoiser's own time included (P16).
 
 By the large network, which makes the view and the layer of files, and, where a pass costs little, by the small one of
-the window's preview.
+the window's preview; also of what automatic mode chooses for a target's error without denoising.
 """
 
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.bench.measures.error import SCENES, Curve, measure
+from pmviewer.bench.measures.error import AUTOMATIC, SCENES, Curve, chosen_for, chosen_with, measure
 from pmviewer.bench.report import BenchResult, Cell, Target
 from pmviewer.engine.opened import open_scene
 from pmviewer.engine.renderer import Renderer
 from pmviewer.output.denoise import denoised
 
-FAST = "progressive, small network"
+SMALL = ", small network"
+FAST = f"progressive{SMALL}"
 METHODS: dict[str, dict[str, Any]] = {
     "progressive": {},
     FAST: {},
@@ -35,8 +37,10 @@ TARGETS = (
     ("rooms_10x10", 1e-2, 0.5),
     ("ring_caustic", 5e-3, 1.0),
 )
-BUDGETS = {"cornell_diffuse": 3.0, "cornell_caustic": 8.0, "ring_caustic": 3.0, "rooms_10x10": 3.0}
-"""CPU seconds a curve, several times the slowest target of the scene."""
+BUDGETS = {"cornell_diffuse": 3.0, "cornell_caustic": 5.0, "ring_caustic": 3.0, "rooms_10x10": 3.0}
+"""CPU seconds a curve, twice the slowest target of the scene and more."""
+AUTOMATIC_BUDGET = 3.0
+"""Of the curves by what automatic mode chooses, over their target's seconds."""
 QUICK_SHARE = 0.25
 
 
@@ -63,13 +67,34 @@ def run(quick: bool = False) -> BenchResult:
             plain = measure(opened, method, budget, values=values)
             show = partial(picture, fast=name == FAST)
             curve = curves[scene, name] = measure(opened, method, budget, values=values, show=show)
-            for i, passes in enumerate(curve.passes):
-                before = plain.error[plain.passes.index(passes)] if passes in plain.passes else ""
-                rows.append([scene, name, passes, curve.cpu[i], before, curve.error[i], f"{curve.ratio[i]:.4f}"])
-    targets = []
+            rows += _rows(curve, name, plain)
+    targets, notes = [], []
     for scene, error, bound in TARGETS:
-        best = min(METHODS, key=lambda name: curves[scene, name].time_to(error))
+        opened = open_scene(scene)
+        values, said = chosen_for(opened, error)
+        notes.append(said)
+        mine = {name: curve for (of, name), curve in curves.items() if of == scene}
+        for ending, fast in (("", False), (SMALL, True)):
+            budget = AUTOMATIC_BUDGET * bound * (QUICK_SHARE if quick else 1.0)
+            show = partial(picture, fast=fast)
+            curve = measure(opened, values["render.method"], budget, values=values, show=show)
+            name = f"{AUTOMATIC} for {error:g}{ending}"
+            mine[name] = replace(curve, method=name)
+            rows += _rows(curve, name)
+        best = min(mine, key=lambda name: mine[name].time_to(error))
         note = f"{scene} denoised to relMSE {error:g}, best method: {best}"
-        targets.append(Target("P16", curves[scene, best].time_to(error), bound, "CPU s", False, note))
+        if best.startswith(AUTOMATIC):
+            note += chosen_with(mine[best])
+        targets.append(Target("P16", mine[best].time_to(error), bound, "CPU s", False, note))
     columns = ["scene", "method", "passes", "CPU s", "relMSE before", "relMSE", "mean ratio"]
-    return BenchResult("Denoised pictures: error against time", columns, rows, targets)
+    return BenchResult("Denoised pictures: error against time", columns, rows, targets, notes)
+
+
+def _rows(curve: Curve, name: str, plain: Curve | None = None) -> list[list[Cell]]:
+    """The table's rows of a curve; `plain`: of the same way without denoising."""
+    rows: list[list[Cell]] = []
+    for i, passes in enumerate(curve.passes):
+        known = plain is not None and passes in plain.passes
+        before: Cell = plain.error[plain.passes.index(passes)] if plain is not None and known else ""
+        rows.append([curve.scene, name, passes, curve.cpu[i], before, curve.error[i], f"{curve.ratio[i]:.4f}"])
+    return rows

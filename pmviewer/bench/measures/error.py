@@ -162,16 +162,24 @@ def measure_peer(scene: str, budget: float) -> Curve:
     return Curve(scene, method, spp, cpu, [m.relmse_all for m in found], [m.mean_ratio for m in found])
 
 
-def automatic(scene: str, error: float, budget: float) -> tuple[Curve, str]:
-    """The curve of what automatic mode chooses for that error, and a sentence about its choice."""
-    opened, pool = open_scene(scene), WorkPool()
+def chosen_for(opened: OpenScene, error: float) -> tuple[dict[str, Any], str]:
+    """The settings that automatic mode chooses for that error, and a sentence about them."""
+    pool = WorkPool()
     try:
         choice = choose(opened, Settings(), Goal(error=error), pool, lambda text, share: None)
     finally:
         pool.close()
     changed = ", ".join(f"{path} = {value}" for path, value in choice.changed.items()) or "the defaults"
-    said = f"automatic mode for {error:g} on {scene}: {changed}; {choice.trial.cpu_seconds:.2g} CPU s of trial besides"
-    values = dict(choice.values)
+    scene, spent = opened.scene.name, choice.trial.cpu_seconds
+    return dict(
+        choice.values
+    ), f"automatic mode for {error:g} on {scene}: {changed}; {spent:.2g} CPU s of trial besides"
+
+
+def automatic(scene: str, error: float, budget: float) -> tuple[Curve, str]:
+    """The curve of what automatic mode chooses for that error, and a sentence about its choice."""
+    opened = open_scene(scene)
+    values, said = chosen_for(opened, error)
     curve = measure(opened, values["render.method"], budget, values=values)
     return replace(curve, method=f"{AUTOMATIC} for {error:g}"), said
 
