@@ -20,7 +20,10 @@ TABLE = SIDE + SIDE * SIDE
 CUBES = 16
 """Along each side of the space that is cut."""
 SEEN_FACINGS = 4
+"""Along each side of the octahedral map of the directions that surfaces in a cube face."""
 UNSEEN = 0.25
+"""With less, what a table takes for unseen and is not is met rarely and counts more: relative variance of irradiance in
+a living room 20 with 0.25, 28 with 0.1."""
 
 _f4 = np.float32
 _i8 = np.int64
