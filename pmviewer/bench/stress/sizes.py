@@ -53,9 +53,10 @@ def _far_camera(lab: Lab) -> Outcome:
 
 def kept(r: float, flatness: float = 0.2) -> float:
     """Share of the photons of a uniformly lit sphere of radius 1 that a disc of radius r finds: those no farther than
-    r, no farther off the tangent plane than flatness·r (a chord d is d²/2 off it), and from the front: light that
-    arrives around a normal with cosines c = 1 − d²/2 to the disc's comes (1 + c)/2 from its front."""
-    d2 = min(r * r, 2 * flatness * r, 4.0)
+    r, no farther off the tangent plane than flatness·r (a chord d is d²/2 off it), whose normal is at most 120° from
+    the disc's, and from the front: light that arrives around a normal with cosines c = 1 − d²/2 to the disc's comes
+    (1 + c)/2 from its front."""
+    d2 = min(r * r, 2 * flatness * r, 3.0)
     return (d2 - d2 * d2 / 8) / (r * r)
 
 
