@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pmviewer.engine.opened import Arrangement, open_scene, rearranged
-from pmviewer.kernels.lights.sky_seen import SIDE, TABLE
+from pmviewer.kernels.lights.sky_square import SIDE, TABLE
 from pmviewer.scene.description import Camera, ConstantEnvironment, ImageEnvironment, Parallelogram, Scene, Shape
 from tests.support.scenes import GREY, box_walls, diffuse, rendered, settings_of
 
@@ -24,7 +24,7 @@ def sky(pixels=None):
     return ImageEnvironment("sky", even if pixels is None else pixels, np.eye(3))
 
 
-def room(lights=None, window=True, two_sided=True):
+def room(lights=None, window=True):
     """Seen from close below the ceiling, straight down; only the floor reflects."""
     walls = [replace(wall, material=0 if wall.name == "floor" else BLACK) for wall in box_walls()]
     if window:
@@ -35,7 +35,7 @@ def room(lights=None, window=True, two_sided=True):
         ):  # fmt: skip
             walls.append(Shape(f"strip {k}", Parallelogram((x, 1, z), (along, 0, 0), (0, 0, across)), BLACK))
     camera = Camera((0, 0.5, 0), (0, -1, 0), (0, 0, 1), 4.0, near=0.0, far=np.inf)
-    materials = (diffuse(two_sided=two_sided), diffuse("black", (0.0,) * 3))
+    materials = (diffuse(), diffuse("black", (0.0,) * 3))
     return Scene("room", None, tuple(walls), materials, (sky(),) if lights is None else lights, camera, 16, 16)
 
 
@@ -47,7 +47,7 @@ def of_a_quarter(a, b):
 
 
 def passes(opened, seed):
-    settings = settings_of(render={"method": "path", "max_depth": 1, "seed": seed}, stop={})
+    settings = settings_of(render={"method": "path", "max_depth": 1, "seed": seed})
     return rendered(opened, settings, 16).frame(0).image().astype(float)
 
 

@@ -13,7 +13,7 @@ import pytest
 from pmviewer.kernels.compile.jit import kernel
 from pmviewer.kernels.lights.light import environment_radiance, sample_one_light
 from pmviewer.kernels.lights.sky_facing import FACINGS, FLOOR, facing_sky, place_on_light, seen_light_pdf
-from pmviewer.kernels.lights.sky_seen import SIDE, TABLE
+from pmviewer.kernels.lights.sky_square import SIDE, TABLE
 from pmviewer.kernels.memory import stack_i4
 from pmviewer.kernels.random import SOBOL, draw4
 from pmviewer.render.direct.choice import LIST_WORDS, choose_by_power

@@ -18,6 +18,7 @@ from pmviewer.bench.agree.ours import AROUND, METHODS, NEAREST_REACH, VIRTUAL
 from pmviewer.bench.agree.pooled import SURE, Pooled, farthest_off, pooled
 from pmviewer.bench.agree.results import Results
 from pmviewer.bench.agree.shares import LOTS, MAIN, PANES, SCATTERING
+from pmviewer.bench.agree.stages import FOLLOWED
 from pmviewer.bench.agree.statistics import LEVEL, rejected
 from pmviewer.bench.agree.triage import save, saved, smallest, without_all
 from pmviewer.bench.agree.trial import FIRST, FORGIVEN, STAGES
@@ -211,7 +212,8 @@ def _settings_notes() -> list[str]:
         f"each scene whose number {OWN_KERNELS} divides runs kernels for what is in it alone, the others those for all "
         "kinds of materials, textures and lights",
         "Mitsuba renders every scene at scale 1: its rays leave surfaces by 9e-5 of a unit at least",
-        f"radii are relative to the scene's, on wide stages to {AROUND:g} times that of what stands there",
+        f"radii are relative to the scene's, on wide stages to {AROUND:g} times that of what stands there; domes there "
+        f"reflect nothing in the profiles {', '.join(FOLLOWED)}, where so narrow look-ups hardly meet their photons",
         f"nearest: estimate.lookup=nearest with k = 10 within {NEAREST_REACH:g} of these radii",
         *(f"{name}: {', '.join(f'{k}={v}' for k, v in METHODS[name].items())}" for name in OTHERS),
         f"a disagreement is one by Holm's correction at {LEVEL:g} over all comparisons of the run",

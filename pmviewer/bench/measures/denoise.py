@@ -70,17 +70,12 @@ def run(quick: bool = False) -> BenchResult:
             rows += _rows(curve, name, plain)
     targets, notes = [], []
     for scene, error, bound in TARGETS:
-        opened = open_scene(scene)
-        values, said = chosen_for(opened, error)
-        notes.append(said)
         mine = {name: curve for (of, name), curve in curves.items() if of == scene}
-        for ending, fast in (("", False), (SMALL, True)):
-            budget = AUTOMATIC_BUDGET * bound * (QUICK_SHARE if quick else 1.0)
-            show = partial(picture, fast=fast)
-            curve = measure(opened, values["render.method"], budget, values=values, show=show)
-            name = f"{AUTOMATIC} for {error:g}{ending}"
-            mine[name] = replace(curve, method=name)
-            rows += _rows(curve, name)
+        found, said = _automatic(scene, error, bound * (QUICK_SHARE if quick else 1.0))
+        notes.append(said)
+        for curve in found:
+            mine[curve.method] = curve
+            rows += _rows(curve, curve.method)
         best = min(mine, key=lambda name: mine[name].time_to(error))
         note = f"{scene} denoised to relMSE {error:g}, best method: {best}"
         if best.startswith(AUTOMATIC):
@@ -90,11 +85,20 @@ def run(quick: bool = False) -> BenchResult:
     return BenchResult("Denoised pictures: error against time", columns, rows, targets, notes)
 
 
+def _automatic(scene: str, error: float, bound: float) -> tuple[list[Curve], str]:
+    """The curves of what automatic mode chooses for that error, by both networks, and a sentence about its choice."""
+    opened = open_scene(scene)
+    values, said = chosen_for(opened, error)
+    curves = []
+    for ending, fast in (("", False), (SMALL, True)):
+        show = partial(picture, fast=fast)
+        curve = measure(opened, values["render.method"], AUTOMATIC_BUDGET * bound, values=values, show=show)
+        curves.append(replace(curve, method=f"{AUTOMATIC} for {error:g}{ending}"))
+    return curves, said
+
+
 def _rows(curve: Curve, name: str, plain: Curve | None = None) -> list[list[Cell]]:
     """The table's rows of a curve; `plain`: of the same way without denoising."""
-    rows: list[list[Cell]] = []
-    for i, passes in enumerate(curve.passes):
-        known = plain is not None and passes in plain.passes
-        before: Cell = plain.error[plain.passes.index(passes)] if plain is not None and known else ""
-        rows.append([curve.scene, name, passes, curve.cpu[i], before, curve.error[i], f"{curve.ratio[i]:.4f}"])
-    return rows
+    before = dict(zip(plain.passes, plain.error, strict=True)) if plain is not None else {}
+    points = zip(curve.passes, curve.cpu, curve.error, curve.ratio, strict=True)
+    return [[curve.scene, name, n, cpu, before.get(n, ""), error, f"{ratio:.4f}"] for n, cpu, error, ratio in points]

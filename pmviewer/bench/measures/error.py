@@ -170,10 +170,8 @@ def chosen_for(opened: OpenScene, error: float) -> tuple[dict[str, Any], str]:
     finally:
         pool.close()
     changed = ", ".join(f"{path} = {value}" for path, value in choice.changed.items()) or "the defaults"
-    scene, spent = opened.scene.name, choice.trial.cpu_seconds
-    return dict(
-        choice.values
-    ), f"automatic mode for {error:g} on {scene}: {changed}; {spent:.2g} CPU s of trial besides"
+    of, spent = f"{error:g} on {opened.scene.name}", choice.trial.cpu_seconds
+    return dict(choice.values), f"automatic mode for {of}: {changed}; {spent:.2g} CPU s of trial besides"
 
 
 def automatic(scene: str, error: float, budget: float) -> tuple[Curve, str]:

@@ -2,7 +2,8 @@
 
 A room that looks out through its windows sees a hundredth of the sky, and of the rays to samples of all of it the rest
 ends at walls. Rays from some points of what the camera sees, and of what is seen from there, tell what arrives. The
-tables change the noise of direct light and nothing else, so that few rays are enough.
+tables change the noise of direct light and nothing else, so that few rays are enough, and members of a cluster make
+their own. They take 71 MB at most.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from numpy.typing import NDArray
 
 from pmviewer.engine.radius import seen_from
 from pmviewer.kernels import scene as K
-from pmviewer.kernels.lights.sky_seen import CUBES, SEEN_FACINGS, SIDE, UNSEEN
+from pmviewer.kernels.lights.sky_seen import CUBES, SEEN_FACINGS
+from pmviewer.kernels.lights.sky_square import SIDE
 from pmviewer.render.camera import resolve_camera
 from pmviewer.render.closest_hits import closest_hits
 from pmviewer.scene.arrays.flatten import FlatScene
@@ -38,6 +40,8 @@ BACK = 1e-3
 """Of the way to a place, how far before it rays start."""
 AROUND = 0.02
 """Of the places, along each axis, left out on either side of the space that is cut."""
+UNSEEN = 0.25
+"""Of the samples, as if all light arrived: what the few rays did not find is met rarely otherwise, and counts more."""
 LEAST = 0.01
 """Of the samples, spread over the whole sky: lobes may reflect what is below the surface that a table is for."""
 

@@ -18,7 +18,8 @@ from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import has, specialised
 from pmviewer.kernels.lights.environment import cell_of_square, image_pdf
 from pmviewer.kernels.lights.light import one_light_pdf
-from pmviewer.kernels.lights.sky_seen import SIDE, TABLE, facing_cell, seen_table
+from pmviewer.kernels.lights.sky_seen import seen_table
+from pmviewer.kernels.lights.sky_square import SIDE, TABLE, facing_cell
 from pmviewer.kernels.memory import load_f4
 from pmviewer.kernels.table import find_interval
 from pmviewer.kernels.vector import dot, scale

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.kernels.lights.sky_facing import FACINGS, FLOOR
-from pmviewer.kernels.lights.sky_seen import SIDE, TABLE
+from pmviewer.kernels.lights.sky_square import SIDE, TABLE
 from pmviewer.scene.arrays.sky_table import SkyTable
 
 Float32 = NDArray[np.float32]
