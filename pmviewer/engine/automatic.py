@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from pmviewer.engine.diagnose import Looked
 from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
@@ -13,6 +15,7 @@ from pmviewer.engine.stages.pass_data import RenderedPass
 from pmviewer.engine.stages.radiance_photons import AUTOMATIC_CUTOFF, AUTOMATIC_CUTOFF_NEAREST
 from pmviewer.maps.search.grid import PhotonGrid
 from pmviewer.photons.bounces import most_bounces
+from pmviewer.render.pixel_samples import EDGED
 
 
 def automatic_values(looked: Looked, first: FirstRadii) -> dict[str, Any]:
@@ -33,12 +36,18 @@ def automatic_values(looked: Looked, first: FirstRadii) -> dict[str, Any]:
         found["photons.max_bounces"] = most_bounces(settings.photons, plan.media)
         found["photons.projection"] = "off" if looked.light.tracer.projection is None else "on"
     if not plan.path:
-        found["render.mirror_rays"] = plan.mirror_rays
+        found["render.mirror_rays"], found["render.edge_rays"] = plan.mirror_rays, _edge_rays(looked)
     found["direct.choice"] = plan.choice
     found["direct.samples"] = plan.light_samples
     if looked.latest is not None:
         found |= _of_maps(looked.latest, plan, radius)
     return found
+
+
+def _edge_rays(looked: Looked) -> int:
+    """Of pixels with edges; 1 where these are so many that none has more."""
+    marks = looked.latest.marks if looked.latest is not None else np.zeros(0, np.uint8)
+    return looked.plan.edge_rays if (marks & EDGED).any() else 1
 
 
 def _of_maps(latest: RenderedPass, plan: Plan, radius: float) -> dict[str, Any]:

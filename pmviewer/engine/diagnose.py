@@ -198,7 +198,7 @@ def samples_plane(looked: Looked) -> dict[str, NDArray[np.float32]]:
     film, rendered = looked.film, looked.rendered
     samples = np.ones(film.width * film.height, np.float32)
     if len(rendered.marks):
-        samples[:] = samples_by_marks(rendered.marks, looked.plan.mirror_rays)
+        samples[:] = samples_by_marks(rendered.marks, looked.plan.mirror_rays, looked.plan.edge_rays)
     if film.refined is not None and film.passes > 1:
         samples[~film.refined] = -1.0
     return {"samples a pass": samples.reshape(film.height, film.width, 1)}

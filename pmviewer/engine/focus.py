@@ -44,7 +44,7 @@ def surface_at(scene: FlatScene, camera: CameraPose, x: float, y: float) -> NDAr
 
     origin, direction = (np.ascontiguousarray(part, np.float32) for part in camera.rays(np.array([x]), np.array([y])))
     forward = camera.axes()[2]
-    near = np.array([camera.seen_from(origin[0], direction[0])], np.float32)
+    near = camera.seen_from(origin, direction).astype(np.float32)
     far = np.array([camera.far / float(direction[0] @ forward)], np.float32)
     t, prim, uv = np.empty(1, np.float32), np.empty(1, np.int32), np.empty((1, 2), np.float32)
     cast_closest(scene.record[0], origin, direction, near, far, t, prim, uv)

@@ -111,7 +111,7 @@ def _warnings(looked: Looked, tally: Tally, energy: Energy | None, told: Told) -
     pixels, marks = len(film.sums), looked.latest.marks if looked.latest is not None else np.empty(0, np.uint8)
     before = min(film.passes, DECIDED_AFTER)
     usual, latest = (
-        int(samples_by_marks(kept, plan.mirror_rays).sum()) if len(kept) else pixels
+        int(samples_by_marks(kept, plan.mirror_rays, plan.edge_rays).sum()) if len(kept) else pixels
         for kept in (without_doublings(marks), marks)
     )
     paths = before * usual + (film.passes - before) * latest

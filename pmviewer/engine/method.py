@@ -33,7 +33,7 @@ SHOWN = "Lights and the sky are shown, which the file or render.lights hides: no
 ALL = 1 << DIRECT | 1 << CAUSTIC | 1 << INDIRECT | 1 << INDIRECT_CAUSTIC
 
 
-MIRROR_RAYS = 2
+MIRROR_RAYS, EDGE_RAYS = 2, 2
 """Samples a pass where mirrors and glass are seen, automatic."""
 
 
@@ -56,9 +56,9 @@ class Plan:
     `looked_for` whether direct light is looked for by rays whatever `direct.mis` says; `dispersion` whether glass
     splits light into colours; `lens` whether the render camera has one, `filtered` whether the film has another
     reconstruction filter than the plain box, `moments` whether the film keeps what passes tell of its noise, `split`
-    whether camera paths go both ways at glass, `mirror_rays` how many samples a pass pixels have that show a mirror or
-    glass, `one_sample` whether something forbids more than one, and `adaptive` whether noisy pixels get more
-    (`pmviewer.render.adaptive`); `hides` whether the picture shows no lights;
+    whether camera paths go both ways at glass, `mirror_rays` and `edge_rays` how many samples a pass pixels have that
+    show a mirror or glass, and that edges cross, `one_sample` whether something forbids more than one, and `adaptive`
+    whether noisy pixels get more (`pmviewer.render.adaptive`); `hides` whether the picture shows no lights;
     `nearest` is whether look-ups reach to the nearest photons, however far these are, to `neighbours` in the first
     pass;
     `thin_glass` are the rules by which light passes panes of glass, () where all of it is exact; `maps` is how many
@@ -94,6 +94,7 @@ class Plan:
     hides: bool = False
     one_sample: bool = False
     mirror_rays: int = 1
+    edge_rays: int = 1
     adaptive: bool = False
     media: bool = False
     volume: bool = False
@@ -215,7 +216,8 @@ def _plan_of(settings: Settings, traits: SceneTraits) -> Plan:
         warnings=(*plan.warnings, *_of_thin(settings, traits), *_of_dispersion(plan, traits)),
     )
     adaptive = settings.render.adaptive == "on" and plan.moments and not plan.one_sample
-    plan = replace(plan, mirror_rays=_mirror_rays(settings, traits, plan), adaptive=adaptive)
+    mirror_rays, edge_rays = _pixel_samples(settings, traits, plan)
+    plan = replace(plan, mirror_rays=mirror_rays, edge_rays=edge_rays, adaptive=adaptive)
     if not plan.photons:
         return plan
     how = settings.importance
@@ -282,11 +284,13 @@ def radii_of_pixels(facts: Facts) -> bool:
     return asked and unmet(needs_of("estimate.radius_rule"), facts) is None
 
 
-def _mirror_rays(settings: Settings, traits: SceneTraits, plan: Plan) -> int:
-    if plan.one_sample or not traits.follows(settings.photons.glossy):
-        return 1
-    asked = settings.render.mirror_rays
-    return MIRROR_RAYS if asked == "auto" else int(asked)
+def _pixel_samples(settings: Settings, traits: SceneTraits, plan: Plan) -> tuple[int, int]:
+    """`mirror_rays` and `edge_rays`."""
+    if plan.one_sample:
+        return 1, 1
+    render, follows = settings.render, traits.follows(settings.photons.glossy)
+    mirrors = MIRROR_RAYS if render.mirror_rays == "auto" else int(render.mirror_rays)
+    return mirrors if follows else 1, EDGE_RAYS if render.edge_rays == "auto" else int(render.edge_rays)
 
 
 def hides_lights(settings: Settings, traits: SceneTraits) -> bool:

@@ -36,7 +36,9 @@ from pmviewer.photons.emission.tested import prepare_weighing
 from pmviewer.photons.light_pass.ledger import N_COUNTS, empty_ledger
 from pmviewer.photons.light_pass.trace import LIGHT_PASS_DTYPE, PhotonBuffers, trace_photons
 from pmviewer.photons.projection.projected import NO_PROJECTION
+from pmviewer.render.closest_hits import no_hits
 from pmviewer.render.counts import N_COUNTS as N_EYE_COUNTS
+from pmviewer.render.edges import mark_crossed
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film
 from pmviewer.render.mirrored import mark_mirrors
@@ -144,9 +146,9 @@ def _light_steps(scene: OpenScene, settings: Settings, plan: Plan) -> list[Step]
 
 
 def _casting(record: NDArray[np.void]) -> Step:
-    points, ends = np.empty((0, 3), np.float32), np.empty(0, np.float32)
-    hits = ends, np.empty(0, np.int32), np.empty((0, 2), np.float32)
-    return Step("ray casting", cast_closest, (record[0], points, points, ends, ends, *hits))
+    o, d, *hits = no_hits()
+    ends = np.empty(0, np.float32)
+    return Step("ray casting", cast_closest, (record[0], o, d, ends, ends, *hits))
 
 
 def _filter_steps(eye: NDArray[np.void], marks: NDArray[np.uint8]) -> list[Step]:
@@ -168,6 +170,9 @@ def eye_steps(record: NDArray[np.void], traits: SceneTraits, settings: Settings,
     if plan.mirror_rays > 1:
         none = np.empty(0, np.int32), np.zeros(0, bool), np.zeros(0, np.uint8)
         steps += [_casting(record), Step("mirrors", mark_mirrors, (record, *none))]
+    if plan.edge_rays > 1:
+        squares = np.empty((0, 4), np.int64), np.empty(0, bool)
+        steps += [_casting(record), Step("edges", mark_crossed, (record, no_hits(), *squares))]
     record = thin_record(record, settings, plan)
     if plan.path:
         return [*steps, Step("path tracer", path_pass, (record, eye, film, counts, 0, 0))]

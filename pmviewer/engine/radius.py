@@ -82,7 +82,7 @@ def seen_from(
     u = (np.arange(probes) + 0.5) / probes
     x, y = (g.reshape(-1) for g in np.meshgrid(u * camera.width, u * camera.height))
     origins, directions = (np.asarray(part, np.float32) for part in camera.rays(x, y))
-    t, prims = closest_hits(scene.record[0], origins, directions)
+    _, _, t, prims, _ = closest_hits(scene.record[0], origins, directions)
     met = prims >= 0
     return origins[met], directions[met], t[met], prims[met]
 

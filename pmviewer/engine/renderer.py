@@ -228,8 +228,9 @@ class Renderer:
         film = self.film
         if not self.plan.adaptive or film.passes != DECIDED_AFTER or film.moments is None:
             return
-        marks = self._still_marks(film)
-        samples = samples_by_marks(marks if len(marks) else np.zeros(len(film.sums), np.uint8), self.plan.mirror_rays)
+        marks, plan = self._still_marks(film), self.plan
+        marks = marks if len(marks) else np.zeros(len(film.sums), np.uint8)
+        samples = samples_by_marks(marks, plan.mirror_rays, plan.edge_rays)
         chosen = filter_of(self.camera.filter, self.settings.render)
         reach = reach_of(chosen, self.camera.pixel_side) if self.plan.filtered else 0
         cost = cost_of(samples, film.sums[:, PLANES["normal"]] / film.passes)
@@ -345,7 +346,7 @@ class Renderer:
 
     def _maps(self, film: Film, camera: CameraPose, index: int, N: int, again: bool = False) -> RenderedPass:
         """All of pass `index` but its picture; `again` for a pass that is in the film already."""
-        marks = self.tally.timed(self.pool, "camera pass", lambda: self._marks_of(film, index))
+        marks = self.tally.timed(self.pool, "edges and mirrors", lambda: self._marks_of(film, index))
         self.latest = self._stages.run(camera, marks, index, N, self._radii_of_pixels(film, again))
         self._told = None
         return self.latest

@@ -136,7 +136,7 @@ class CameraPose:
         frame.flags.writeable = False
         return frame
 
-    def rays(self, x: NDArray[np.floating], y: NDArray[np.floating]) -> tuple[Matrix, Matrix]:
+    def rays(self, x: NDArray[np.number], y: NDArray[np.number]) -> tuple[Matrix, Matrix]:
         """Origins and unit directions (n, 3) of the rays through places (n,) of the image, in pixels."""
         eye, corner, right, down = self.ray_frame()
         places = corner + np.asarray(x, float)[:, None] * right + np.asarray(y, float)[:, None] * down
@@ -144,20 +144,19 @@ class CameraPose:
             return eye + places, np.broadcast_to(self.axes()[2], places.shape).copy()
         return np.broadcast_to(eye, places.shape).copy(), places / np.linalg.norm(places, axis=1, keepdims=True)
 
-    def seen_from(self, origin: NDArray[np.floating], direction: NDArray[np.floating]) -> float:
-        """From which distance on a ray of the camera from `origin` (3,) in the unit `direction` (3,) sees: the near
-        plane; infinity if it never passes it."""
+    def seen_from(self, origin: NDArray[np.floating], direction: NDArray[np.floating]) -> NDArray[np.float64]:
+        """From which distance on rays of the camera from `origin` (…, 3) in the unit `direction` (…, 3) see: (…), the
+        near plane; infinity if they never pass it."""
         normal = self.axes()[2] if self.near_normal is None else np.asarray(self.near_normal, float)
-        before = self.near - float(np.subtract(origin, self.origin) @ normal) if self.near > 0 else 0.0
-        towards = float(direction @ normal)
-        if before <= 0:
-            return 0.0
-        return before / towards if towards > 0 else math.inf
+        towards = np.asarray(direction @ normal, float)
+        before = np.maximum(self.near - np.subtract(origin, self.origin) @ normal, 0.0) if self.near > 0 else 0.0
+        passes = np.where(towards > 0, before / np.where(towards > 0, towards, 1.0), math.inf)
+        return np.where(before > 0, passes, 0.0)
 
     def start(self) -> NDArray[np.float64]:
         """Where (3,) the view along the axis begins: the eye, or the near plane before it."""
         forward, origin = self.axes()[2], np.asarray(self.origin, float)
-        near = self.seen_from(origin, forward)
+        near = float(self.seen_from(origin, forward))
         return origin + near * forward if near < math.inf else origin
 
     def sees_like(self, other: CameraPose) -> bool:

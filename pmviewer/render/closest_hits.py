@@ -2,20 +2,41 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pmviewer.kernels.accel.raycast import cast_closest
 
 
+class Hits(NamedTuple):
+    """What rays met, as kernels take it: origins and directions (n, 3) float32, distances (n,) float32, primitives (n,)
+    int32, −1 for none, and the places on these (n, 2) float32."""
+
+    origins: NDArray[np.float32]
+    directions: NDArray[np.float32]
+    t: NDArray[np.float32]
+    prims: NDArray[np.int32]
+    uv: NDArray[np.float32]
+
+
+def no_hits(n: int = 0) -> Hits:
+    """Of n rays, not filled in."""
+    points = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
+    return Hits(*points, np.empty(n, np.float32), np.empty(n, np.int32), np.empty((n, 2), np.float32))
+
+
 def closest_hits(
-    scene: np.void, origins: NDArray[np.floating], directions: NDArray[np.floating], far: ArrayLike = np.inf
-) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """What rays from `origins` in the unit `directions` (n, 3) meet nearer than `far`, one number or (n,): distances
-    and primitives (n,), −1 for none."""
-    n = len(origins)
-    rays = (np.ascontiguousarray(part, np.float32) for part in (origins, directions))
-    ends = np.zeros(n, np.float32), np.ascontiguousarray(np.broadcast_to(np.asarray(far, np.float32), n))
-    t, primitive, uv = np.empty(n, np.float32), np.empty(n, np.int32), np.empty((n, 2), np.float32)
-    cast_closest(scene, *rays, *ends, t, primitive, uv)
-    return t, primitive
+    scene: np.void,
+    origins: NDArray[np.floating],
+    directions: NDArray[np.floating],
+    far: ArrayLike = np.inf,
+    near: ArrayLike = 0.0,
+) -> Hits:
+    """What rays from `origins` in the unit `directions` (n, 3) meet from `near` to `far`, one number each or (n,)."""
+    hits = no_hits(len(origins))
+    hits.origins[:], hits.directions[:] = origins, directions
+    ends = (np.ascontiguousarray(np.broadcast_to(np.asarray(end, np.float32), len(origins))) for end in (near, far))
+    cast_closest(scene, hits.origins, hits.directions, *ends, hits.t, hits.prims, hits.uv)
+    return hits

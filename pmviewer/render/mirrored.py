@@ -56,7 +56,7 @@ def mirrored_pixels(scene: FlatScene, camera: CameraPose, glossy: float) -> NDAr
     block = block_of(camera)
     columns, rows = (-(-side // block) for side in (camera.width, camera.height))
     x, y = (block * (places.ravel() + 0.5) for places in np.meshgrid(np.arange(columns), np.arange(rows)))
-    _, prims = closest_hits(scene.record[0], *camera.rays(x, y))
+    prims = closest_hits(scene.record[0], *camera.rays(x, y)).prims
     blocks = np.zeros(len(prims), np.uint8)
     mark_mirrors(scene.record, prims, mirrors, blocks)
     if not blocks.any():

@@ -140,6 +140,7 @@ class Evaluation:
     splits: int = 0
     several: bool = False
     mirror_rays: int = 1
+    edge_rays: int = 1
 
 
 NOTHING_EVALUATED = Evaluation()

@@ -11,7 +11,7 @@ from pmviewer.engine.stages.pass_data import blank_eye
 from pmviewer.engine.store import StageStore
 from pmviewer.render.adaptive import DECIDED_AFTER, MOST, cost_of, doublings_of
 from pmviewer.render.moments import Moments
-from pmviewer.render.pixel_samples import DOUBLINGS, MIRRORED, samples_by_marks
+from pmviewer.render.pixel_samples import DOUBLINGS, EDGED, MIRRORED, samples_by_marks
 from tests.support.scenes import cornell_box, settings_of
 
 SIZE, PASSES = 24, 14
@@ -108,8 +108,11 @@ def test_costs_are_those_of_samples_that_meet_something():
 
 
 def test_marks_hold_how_many_samples():
-    marks = np.array([0, MIRRORED, 1 << DOUBLINGS, MIRRORED | 3 << DOUBLINGS, 1], np.uint8)
-    assert samples_by_marks(marks, 3).tolist() == [1, 3, 2, 24, 1]
+    edge = EDGED | 1 << DOUBLINGS
+    marks = np.array(
+        [0, MIRRORED, 1 << DOUBLINGS, MIRRORED | 3 << DOUBLINGS, 1, EDGED, edge, MIRRORED | edge], np.uint8
+    )
+    assert samples_by_marks(marks, 3, 5).tolist() == [1, 3, 2, 24, 1, 5, 10, 30]
 
 
 def renderer(pool, adaptive, seed=0, method="gather", **groups):
@@ -183,13 +186,14 @@ def test_records_have_room_for_samples_wherever_several_may_be(pool):
 
 
 def test_a_view_shows_how_many_samples(pool):
-    """Two in mirrors and glass, doubled as often as it was decided."""
-    one = stepped(renderer(pool, "on", region={"on": True, "left": 0.0, "top": 0.0, "right": 1.0, "bottom": 0.5}), 9)
+    """Two in mirrors and glass and at edges, four where both are, doubled as often as it was decided."""
+    region = {"on": True, "left": 0.0, "top": 0.0, "right": 1.0, "bottom": 0.5}
+    one = stepped(renderer(pool, "on", render={"edge_rays": 2}, region=region), 9)
     (shown,) = one.inspect(Wanted("samples")).planes.values()
-    usual = renderer(pool, "off")
+    usual = renderer(pool, "off", render={"edge_rays": 2})
     usual.step()
     (before,) = usual.inspect(Wanted("samples")).planes.values()
-    assert set(np.unique(before)) == {1.0, 2.0}
+    assert set(np.unique(before)) == {1.0, 2.0, 4.0}
     top, doublings = SIZE // 2, one.film.doublings.reshape(SIZE, SIZE)
     assert np.array_equal(shown[:top, :, 0], before[:top, :, 0] * np.exp2(doublings[:top]))
     assert (shown[top:] == -1.0).all()

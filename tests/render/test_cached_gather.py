@@ -148,7 +148,7 @@ def test_without_mis_indirect_light_is_still_there():
 
 
 def test_statistics_and_cloud():
-    renderer = cached(diffuse_box(size=64), 2)
+    renderer = cached(diffuse_box(size=64), 2, render={"method": "gather", "edge_rays": 1})
     frame = renderer.frame(1)
     statistics, cloud = frame.statistics, frame.clouds["cache"]
     assert statistics.cache_records == len(cloud.photons) == len(cloud.reach) == statistics.stored_in_pass["cache"]

@@ -171,7 +171,7 @@ def test_any_number_of_threads_gives_the_same_planes(box, pool):
 
 
 LOOKED_UP = {"look-up radius", "photon count", "samples a pass"}
-"""Of photon methods in these tests' rooms, which are as if there were mirrors."""
+"""Of photon methods."""
 
 
 @pytest.mark.parametrize(

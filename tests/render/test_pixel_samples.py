@@ -109,8 +109,9 @@ def test_where_it_does_nothing_it_says_why():
     ):
         assert "One sample" in inactive_reason("render.mirror_rays", settings_of(**values), box)
     view = "display.view=samples a pass"
-    assert "one sample a pass" in inactive_reason(view, settings_of(), plain)
-    assert inactive_reason(view, settings_of(render={"adaptive": "on"}), plain) is None
+    assert inactive_reason(view, settings_of(), plain) is None
+    assert "one sample a pass" in inactive_reason(view, settings_of(render={"edge_rays": 1}), plain)
+    assert inactive_reason(view, settings_of(render={"adaptive": "on", "edge_rays": 1}), plain) is None
 
 
 def test_kernels_for_mirrors_and_glass_show_a_room_without_them_as_it_is(monkeypatch):

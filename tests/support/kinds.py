@@ -46,17 +46,11 @@ def _open_as_if(monkeypatch, where, *features):
 
 
 def may_always_split(monkeypatch):
-    """Kernels follow both ways at glass, and have several samples of pixels that show mirrors, whether there are some
-    or not (`pmviewer.render.split`, `pmviewer.render.pixel_samples`): one variant in place of four, of the same
-    picture."""
-    for name in ("_splits", "_mirror_rays"):
-        monkeypatch.setattr(method, name, _as_if_mirrors_and_glass(getattr(method, name)))
-
-
-def _as_if_mirrors_and_glass(decide):
-    """A decision of `pmviewer.engine.method`, made for such a scene."""
-    return lambda settings, traits, plan: decide(
-        settings, replace(traits, has_smooth_glass=True, has_specular=True), plan
+    """Kernels follow both ways at glass, whether there is some or not (`pmviewer.render.split`): one variant in place
+    of two, of the same picture."""
+    splits = method._splits
+    monkeypatch.setattr(
+        method, "_splits", lambda settings, traits, plan: splits(settings, replace(traits, has_smooth_glass=True), plan)
     )
 
 
@@ -68,8 +62,8 @@ def room_for_split_paths(monkeypatch):
     def widened(camera, settings, index, evaluation):
         if settings.render.method == "path":
             return record_of(camera, settings, index, evaluation)
-        record = record_of(camera, settings, index, replace(evaluation, splits=1, mirror_rays=2))
-        record["splits"], record["mirror_rays"] = evaluation.splits, evaluation.mirror_rays
+        record = record_of(camera, settings, index, replace(evaluation, splits=1, several=True))
+        record["splits"] = evaluation.splits
         return record
 
     monkeypatch.setattr(pass_data, "eye_record", widened)

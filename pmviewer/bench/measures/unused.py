@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pmviewer.bench.report import BenchResult, Cell, Target
-from pmviewer.engine.method import MIRROR_RAYS, Plan
+from pmviewer.engine.method import EDGE_RAYS, MIRROR_RAYS, Plan
 from pmviewer.engine.opened import OpenScene, open_scene
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
@@ -103,7 +103,7 @@ def stripped_plan(needs: Needs) -> Plan:
         choice=needs.choice,
         light_samples=needs.samples,
         mirror_rays=MIRROR_RAYS if needs.mirrors else 1,
-        one_sample=not needs.mirrors,
+        edge_rays=EDGE_RAYS,
     )
 
 

@@ -33,8 +33,8 @@ OTHER_AREA = (
     "differential checking), so that their sum is not its value."
 )
 SEVERAL = (
-    "The pixel has {n} samples a pass (render.mirror_rays, render.adaptive): all that they looked up is listed, each "
-    "at 1/{n} of its light. The way is that of the first."
+    "The pixel has {n} samples a pass (render.mirror_rays, render.edge_rays, render.adaptive): all that they looked up "
+    "is listed, each at 1/{n} of its light. The way is that of the first."
 )
 NO_PHOTONS = "The path tracer looks no photons up."
 

@@ -117,4 +117,4 @@ def _make_room(store: StageStore, done: int, needed: int) -> None:
     """After a pass whose photons and maps needed so many bytes, keep those of the next one if they fit, too. More would
     drive each other out: every picture asks for the first pass first."""
     if needed > 0:
-        store.passes = done + 1 if store.bytes + needed <= store.budget else done
+        store.passes = max(store.passes, done + 1) if store.bytes + needed <= store.budget else done

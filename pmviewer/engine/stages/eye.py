@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 
@@ -19,6 +19,7 @@ from pmviewer.render.camera import CameraPose, hidden_from
 from pmviewer.render.counts import N_COUNTS
 from pmviewer.render.direct.choice import CHOICES
 from pmviewer.render.direct.outline import outline_pixels
+from pmviewer.render.edges import MOST_EDGED, edged_pixels
 from pmviewer.render.eye import eye_pass
 from pmviewer.render.film import Film, Spans
 from pmviewer.render.filter import BOX, filter_of
@@ -144,14 +145,19 @@ def marks_of(
 ) -> NDArray[np.uint8]:
     """What the eye pass does more in which pixels (`pmviewer.render.pixel_samples`): uint8, empty where nothing. The
     film may be smaller than the camera's picture."""
-    outline = outline_of(scene, camera, film, settings, store)
-    if plan.mirror_rays < 2:
-        return outline
+    marks = outline_of(scene, camera, film, settings, store)
     glossy = settings.photons.glossy
     small = replace(camera, width=film.width, height=film.height)
-    key = ("mirrors", scene.uid, small, glossy)
-    mirrored = store.get(key, lambda: mirrored_pixels(scene.flat, small, glossy), lambda pixels: pixels.nbytes)
-    return outline | mirrored if len(outline) and len(mirrored) else outline if len(outline) else mirrored
+    more: list[tuple[Hashable, Callable[[], NDArray[np.uint8]]]] = []
+    if plan.mirror_rays > 1:
+        more.append((("mirrors", scene.uid, small, glossy), lambda: mirrored_pixels(scene.flat, small, glossy)))
+    if plan.edge_rays > 1:
+        most = MOST_EDGED if settings.render.edge_rays == "auto" else 1.0
+        more.append((("edges", scene.uid, small, most), lambda: edged_pixels(scene.flat, small, most)))
+    for key, found in more:
+        also = store.get(key, found, lambda pixels: pixels.nbytes)
+        marks = marks | also if len(marks) and len(also) else marks if len(marks) else also
+    return marks
 
 
 def gather_rays_of(rendered: RenderedPass, x: int, y: int, pool: WorkPool) -> NDArray[np.float32]:

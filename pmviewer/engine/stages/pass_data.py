@@ -50,7 +50,8 @@ class RenderedPass:
         eye = self.given.eye[0]
         if "mirror_rays" not in (eye.dtype.names or ()) or len(self.marks) == 0:
             return 1
-        return int(samples_by_marks(self.marks[pixel : pixel + 1], int(eye["mirror_rays"]))[0])
+        rays = int(eye["mirror_rays"]), int(eye["edge_rays"])
+        return int(samples_by_marks(self.marks[pixel : pixel + 1], *rays)[0])
 
 
 def pass_record(camera: CameraPose, settings: Settings, plan: Plan, maps: PassMaps, index: int) -> NDArray[np.void]:
@@ -89,6 +90,7 @@ def _evaluation(settings: Settings, plan: Plan, maps: PassMaps, index: int) -> E
         splits=settings.render.splits if plan.split else 0,
         several=not plan.one_sample,
         mirror_rays=plan.mirror_rays,
+        edge_rays=plan.edge_rays,
         volume_radius=maps.volume.radius if maps.volume is not None else 0.0,
         free_paths=maps.free_paths,
     )

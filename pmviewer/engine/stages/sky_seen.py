@@ -96,7 +96,7 @@ def sees_as(flat: FlatScene, other: FlatScene) -> bool:
 
 def _sees(flat: FlatScene, points: Float, directions: Float32) -> NDArray[np.bool_]:
     """Whether rays meet nothing, or something that may let light through."""
-    _, prims = closest_hits(flat.record[0], points, directions)
+    prims = closest_hits(flat.record[0], points, directions).prims
     clear = np.array([m.transparent for m in flat.owner.materials])
     materials = flat.arrays["prim_material"]
     stored = (prims >= 0) & (prims < len(materials))  # not those of instances
@@ -113,7 +113,7 @@ def _points(scene: Scene, flat: FlatScene, rng: np.random.Generator) -> Float:
         starts = np.repeat(found[-1], RAYS, axis=0)
         away = rng.standard_normal(starts.shape)
         away /= np.linalg.norm(away, axis=1, keepdims=True)
-        t, prims = closest_hits(flat.record[0], starts, away)
+        _, _, t, prims, _ = closest_hits(flat.record[0], starts, away)
         met = (prims >= 0) & (t > BACK * flat.radius)
         found.append(starts[met] + away[met] * (t[met] * (1 - BACK))[:, None])
     return np.concatenate(found).astype(np.float64)

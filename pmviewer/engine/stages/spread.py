@@ -182,5 +182,5 @@ def _hidden(record: NDArray[np.void], starts: NDArray[np.float64], ends: NDArray
     """Whether something stands between starts and ends (n, k, 3), as (n, k)."""
     ways = (ends - starts).reshape(-1, 3)
     lengths = np.maximum(np.linalg.norm(ways, axis=1), 1e-30)
-    _, prims = closest_hits(record[0], starts.reshape(-1, 3), ways / lengths[:, None], (1 - SHORT) * lengths)
+    prims = closest_hits(record[0], starts.reshape(-1, 3), ways / lengths[:, None], (1 - SHORT) * lengths).prims
     return (prims >= 0).reshape(starts.shape[:2])

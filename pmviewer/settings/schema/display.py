@@ -35,8 +35,8 @@ MOMENTS = Need(
     "Not with weighted virtual lights: their pictures divide sums.",
 )
 SEVERAL_SAMPLES = Need(
-    lambda f: f.plan.adaptive or f.plan.mirror_rays > 1,
-    "All pixels have one sample a pass: no mirror or glass, and no adaptive samples (render.adaptive).",
+    lambda f: f.plan.adaptive or f.plan.mirror_rays > 1 or f.plan.edge_rays > 1,
+    "All pixels have one sample a pass: of mirrors and edges, too, and no adaptive samples (render.adaptive).",
 )
 VIEW_NEEDS: dict[str, Needs] = {
     "denoised": (DENOISER,),

@@ -120,6 +120,22 @@ class Render(Group):
             ONE_SAMPLE,
         ),
     )
+    edge_rays: int | Auto = setting(
+        "auto",
+        "Samples a pass of pixels that an edge of what the camera sees crosses: where all else is smooth, these hold "
+        "most of the error of the first passes. In mirrors as many times as many. Automatic: 2, or 1 where a tenth of "
+        "the pixels have edges.",
+        stage="image",
+        scale="integer",
+        unit="samples",
+        title="samples at edges",
+        ge=1,
+        le=16,
+        needs=(
+            NO_PATHS,
+            ONE_SAMPLE,
+        ),
+    )
     adaptive: Literal["off", "on"] = setting(
         "off",
         "From the ninth pass on, pixels with noise of their own (edges, textures, outlines of shadows, what glass "

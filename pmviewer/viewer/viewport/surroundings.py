@@ -70,16 +70,15 @@ class Surroundings:
     def under(self, pose: CameraPose, pixel: tuple[float, float]) -> Vector | None:
         """The surface point (3,) that the camera sees at that place of the image, in pixels; None without one."""
         origin, direction = _ray(pose, pixel)
-        hit = (
-            self._rays.nearest(origin, direction, pose.seen_from(origin, direction)) if self._rays is not None else None
-        )
+        near, rays = float(pose.seen_from(origin, direction)), self._rays
+        hit = rays.nearest(origin, direction, near) if rays is not None else None
         return origin + direction * hit[0] if hit is not None else None
 
     def object_under(self, pose: CameraPose, pixel: tuple[float, float]) -> int:
         """The number of the object there, shapes before instances; −1 where there is none."""
         origin, direction = _ray(pose, pixel)
-        rays, geometry = self._rays, self._geometry
-        hit = rays.nearest_triangle(origin, direction, pose.seen_from(origin, direction)) if rays is not None else None
+        near, rays, geometry = float(pose.seen_from(origin, direction)), self._rays, self._geometry
+        hit = rays.nearest_triangle(origin, direction, near) if rays is not None else None
         return geometry.object_at(3 * hit[2]) if hit is not None else -1
 
     def depth_ahead(self, pose: CameraPose) -> float:
