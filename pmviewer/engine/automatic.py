@@ -11,7 +11,7 @@ from pmviewer.engine.diagnose import Looked
 from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.radius import FirstRadii
-from pmviewer.engine.stages.pass_data import RenderedPass
+from pmviewer.engine.stages.pass_data import RenderedPass, cache_rays
 from pmviewer.engine.stages.radiance_photons import AUTOMATIC_CUTOFF, AUTOMATIC_CUTOFF_NEAREST
 from pmviewer.maps.search.grid import PhotonGrid
 from pmviewer.photons.bounces import most_bounces
@@ -37,6 +37,8 @@ def automatic_values(looked: Looked, first: FirstRadii) -> dict[str, Any]:
         found["photons.projection"] = "off" if looked.light.tracer.projection is None else "on"
     if not plan.path:
         found["render.mirror_rays"], found["render.edge_rays"] = plan.mirror_rays, _edge_rays(looked)
+    if plan.cache:
+        found["gather.cache_rays"] = cache_rays(settings.gather)
     found["direct.choice"] = plan.choice
     found["direct.samples"] = plan.light_samples
     if looked.latest is not None:

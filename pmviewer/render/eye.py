@@ -190,7 +190,7 @@ def _stored(given, si, beta, pixel, scratch, whole):
     known, gather = cached(given, si, pixel, whole)
     aimed = Aim(scratch[1], _i8(0), _i8(0))
     if gather > 0:
-        aimed = aim(given, si, pixel.seed, scratch[1])
+        aimed = aim(given, si, gather, pixel.seed, scratch[1])
     choice = choose_by_power(scratch[0], eye.light_samples)
     if eye.direct != 0:
         choice = choose(given.scene, eye, given.choice_map, si, scratch[0])

@@ -49,6 +49,7 @@ _FIELDS: list[tuple] = [
     ("global_caustics", "i4"),  # and as caustics
     ("indirect_caustics", "i4"),  # whether caustics after a diffuse bounce belong to the term "caustic"
     ("gather_rays", "i4"),  # final-gather rays, 0 for none
+    ("cache_rays", "i4"),  # those of surfaces that the irradiance cache is for, where no record serves
     ("gather_specular", "i4"),  # whether gather rays follow mirrors and glass
     ("guided_rays", "i4"),  # how many of them photons guide
     ("guide_mask", "i4"),  # path classes of these photons
@@ -119,6 +120,7 @@ class Evaluation:
     global_caustics: int = 0
     indirect_caustics: bool = False
     gather_rays: int = 0
+    cache_rays: int = 0
     gather_specular: bool = False
     guided_rays: int = 0
     guide_mask: int = 0

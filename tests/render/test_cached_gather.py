@@ -221,3 +221,40 @@ def test_what_the_cache_is_for():
     assert inactive_reason("gather.cache_error", on, traits) is None
     assert inactive_reason("overlays.cache.show", on, traits) is None
     assert inactive_reason("overlays.cache.show", gather, traits)
+
+
+def test_more_rays_where_no_record_serves(pool):
+    """16 seeds with one and with eight rays there: other pixels are the same bit for bit, the mean is within its error,
+    and a third of the noise is left where most samples gathered."""
+    scene, pictures = open_scene(diffuse_box(size=32)), {}
+    for rays in (1, 8):
+        runs = []
+        for seed in range(16):
+            settings = settings_of(
+                render={"method": "gather", "seed": seed, "edge_rays": 1},
+                photons={"N": 20_000},
+                gather={**ON, "rays": 1, "cache_rays": rays, "cache_error": 0.3},
+            )
+            one = Renderer(scene, settings, pool, StageStore(0))
+            one.step()
+            runs.append(one.frame(1).image("indirect")[..., 0].astype(float))
+        pictures[rays] = np.array(runs)
+    differ = (pictures[1] != pictures[8]).mean(axis=0)
+    gathered = differ > 0.5
+    assert 0.02 < gathered.mean() < 0.5
+    assert (differ == 0).mean() > 0.1
+    few, many = (run[:, gathered] for run in pictures.values())
+    error = np.hypot(*[run.mean(axis=1).std(ddof=1) / 4 for run in (few, many)])
+    assert many.mean() == pytest.approx(few.mean(), abs=4 * error)
+    share = many.var(axis=0, ddof=1).sum() / few.var(axis=0, ddof=1).sum()
+    print(f"{gathered.mean():.2f} of the pixels gather by themselves; {share:.2f} of their noise is left")
+    assert share < 0.4
+
+
+def test_the_inspector_shows_as_many_rays(pool):
+    """Of a diffuse surface those beside records, twice as many as usual by themselves."""
+    for asked, expected in (("auto", 8), (3, 3)):
+        settings = settings_of(render={"method": "gather"}, gather={**ON, "rays": 4, "cache_rays": asked})
+        one = Renderer(open_scene(diffuse_box(size=24)), settings, pool, StageStore(0))
+        one.step()
+        assert max(len(one.gather_points(x, 12)) for x in range(4, 20)) == expected

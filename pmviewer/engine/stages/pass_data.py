@@ -30,6 +30,11 @@ from pmviewer.render.media.march import march_record
 from pmviewer.render.pixel_samples import samples_by_marks
 from pmviewer.render.record import Evaluation, eye_dtype, eye_record
 from pmviewer.settings.access import Settings
+from pmviewer.settings.schema import Gather
+
+CACHE_RAYS = 2
+"""Times the usual gather rays where no record serves. Variance times seconds over that with those: 0.76 to 0.90 in diffuse
+boxes and rooms (0.68 to 0.94 with four times as many), 0.96 to 1.06 in scenes whose noise is elsewhere (1.01 to 1.12)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +64,11 @@ def pass_record(camera: CameraPose, settings: Settings, plan: Plan, maps: PassMa
     return eye_record(camera, settings, index, _evaluation(settings, plan, maps, index))
 
 
+def cache_rays(gather: Gather) -> int:
+    """Rays of diffuse surfaces where the irradiance cache has no record for them."""
+    return CACHE_RAYS * gather.rays if gather.cache_rays == "auto" else int(gather.cache_rays)
+
+
 def _evaluation(settings: Settings, plan: Plan, maps: PassMaps, index: int) -> Evaluation:
     indirect_caustics = settings.photons.indirect_caustics
     return Evaluation(
@@ -71,6 +81,7 @@ def _evaluation(settings: Settings, plan: Plan, maps: PassMaps, index: int) -> E
         global_caustics=plan.global_caustics,
         indirect_caustics=indirect_caustics,
         gather_rays=settings.gather.rays if plan.gather else 0,
+        cache_rays=cache_rays(settings.gather) if plan.cache else 0,
         gather_specular=not indirect_caustics,
         guided_rays=plan.guided_rays,
         guide_mask=plan.guide_mask,

@@ -50,6 +50,14 @@ def occluded_nearby(given, si, pixel, length):
 
 
 @specialised
+def rays_unknown(given, si):
+    """Gather rays of a surface where nothing is known."""
+    if absent(part(given, "cache")) or has(part(given, "cache"), "estimates"):
+        return lambda given, si: given.eye.gather_rays
+    return lambda given, si: given.eye.cache_rays if is_lambertian(si.bsdf) else given.eye.gather_rays
+
+
+@specialised
 def cached(given, si, pixel, whole):
     """(irradiance, gather rays that are still to be cast) at a surface that a Pixel sees: all rays where nothing is
     known. `whole`: at the camera ray's own surface."""
@@ -75,7 +83,7 @@ def cached(given, si, pixel, whole):
                 pixel.counts[C_CACHED] += 1
                 return E, np.int32(0)
         pixel.counts[C_GATHERED] += 1
-        return BLACK, given.eye.gather_rays
+        return BLACK, rays_unknown(given, si)
 
     return from_records
 

@@ -10,6 +10,7 @@ from pmviewer.kernels.memory import row_of, stack_i4
 from pmviewer.kernels.vector import dot, largest, mul, scale
 from pmviewer.render.cast import cast
 from pmviewer.render.chain import BLACK, arrive
+from pmviewer.render.gather.cached import rays_unknown
 from pmviewer.render.gather.gather import gather_light, gather_survival
 from pmviewer.render.gather.guide import AIM_WORDS, aim, gather_direction
 from pmviewer.render.gather.weak import shows_map
@@ -30,8 +31,8 @@ pixel (red, green, blue), and 1 if photons guided it, 0 if it followed the BSDF.
 @device
 def _replay(given, si, beta, samples, seed, rows, row, counts):
     """The gather rays of a surface, of one of so many samples, into `rows` from `row` on; returns the next free row."""
-    n = given.eye.gather_rays
-    rays = GatherRays(n, _i8(0), aim(given, si, seed, stack_i4(AIM_WORDS)), None, seed, BLACK)
+    n = rays_unknown(given, si)
+    rays = GatherRays(n, _i8(0), aim(given, si, n, seed, stack_i4(AIM_WORDS)), None, seed, BLACK)
     for j in range(n):
         wi, weight, pdf, share, u_end, sample = gather_direction(given, rays, si, j)
         if row >= len(rows) or dot(wi, si.ng) <= _f4(0.0) or not largest(weight) > _f4(0.0):

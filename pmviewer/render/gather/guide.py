@@ -142,12 +142,12 @@ def concentration(found, m, n):
 
 
 @specialised
-def aim(given, si, seed, found):
-    """What photons tell the gather rays of a point (`Aim`), their directions in `found` (AIM_WORDS words). They guide
-    no rays, or as many as the eye record says."""
+def aim(given, si, gather, seed, found):
+    """What photons tell so many gather rays of a point (`Aim`), their directions in `found` (AIM_WORDS words). They
+    guide none of them, or as large a share as the eye record says."""
     guides = part(given, "guides")
     if absent(guides):
-        return lambda given, si, seed, found: Aim(found, _i8(0), _i8(0))
+        return lambda given, si, gather, seed, found: Aim(found, _i8(0), _i8(0))
     if has(guides, "cones"):
         return _aim_by_cones
     return _aim_by_cells
@@ -163,16 +163,22 @@ def _guides(given, si, seed, most, least_concentration, found):
     return m
 
 
-def _aim_by_cones(given, si, seed, found):
+@device
+def _share_of(eye, gather):
+    """How many of so many gather rays photons guide."""
+    return _i8(eye.guided_rays) * _i8(gather) // _i8(eye.gather_rays)
+
+
+def _aim_by_cones(given, si, gather, seed, found):
     m = _guides(given, si, seed, MOST_CONES, CONCENTRATED, found)
-    return Aim(found, _i8(given.eye.guided_rays) if m > 0 else _i8(0), m)
+    return Aim(found, _share_of(given.eye, gather) if m > 0 else _i8(0), m)
 
 
-def _aim_by_cells(given, si, seed, found):
+def _aim_by_cells(given, si, gather, seed, found):
     m = _guides(given, si, seed, MOST_IN_CELLS, CONCENTRATED_CELLS, found)
     if m > 0:
         fill_cells(found, 4 * MOST_IN_CELLS, m, si.bsdf, si.wo)
-    return Aim(found, _i8(given.eye.guided_rays) if m > 0 else _i8(0), m)
+    return Aim(found, _share_of(given.eye, gather) if m > 0 else _i8(0), m)
 
 
 @specialised
@@ -212,17 +218,17 @@ def _by_bsdf(given, rays, si, j):
     u_lobe, u, v = rays.numbers
     sample, u_end = eye.index, _f4(0.0)
     if eye.gather_rays > 0:
-        sample = _u4(eye.index * _u4(eye.gather_rays) + _u4(j))
+        sample = _u4(eye.index * _u4(rays.n) + _u4(j))
         u, v, u_lobe, u_end = draw4(eye.sequence, rays.seed, sample, GATHER)
     wi, weight, pdf, _ = bsdf_sample(given.scene, si.bsdf, STORED, si.wo, u_lobe, u, v)
     return wi, weight, pdf, _f4(1.0), u_end, sample
 
 
 def _by_both(given, rays, si, j):
-    # Guides are for gather rays alone, so that n = eye.gather_rays here.
+    # Guides are for gather rays alone, so that all n are such.
     eye, aimed, b, wo, n = given.eye, rays.aimed, si.bsdf, si.wo, rays.n
     guided = aimed.rays
-    sample = _u4(eye.index * _u4(eye.gather_rays) + _u4(j))
+    sample = _u4(eye.index * _u4(n) + _u4(j))
     n_b = n - guided
     if j < n_b:
         place, dimension = sample, GATHER

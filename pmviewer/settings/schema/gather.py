@@ -178,6 +178,18 @@ class Gather(Group):
         le=1000.0,
         needs=(IRRADIANCE_CACHE,),
     )
+    cache_rays: int | Auto = setting(
+        "auto",
+        "Gather rays a pixel and pass where no record serves: at edges, where records would have to be as narrow as "
+        "what they see is near. Automatic: twice the usual number.",
+        stage="image",
+        scale="integer",
+        unit="rays",
+        title="rays without record",
+        ge=1,
+        le=1024,
+        needs=(IRRADIANCE_CACHE,),
+    )
     estimation: Literal["off", "on"] = setting(
         "off",
         "Final gather estimation: where the picture shows flat, open, diffuse surfaces, few pixels gather, each pass "
