@@ -24,6 +24,7 @@ RESET = (
     "render.indirect",
     "render.outline_rays",
     "render.mirror_rays",
+    "render.edge_rays",
     "render.adaptive",
 )
 """What a preset sets, by the beginnings of names."""
