@@ -391,7 +391,7 @@ class Renderer:
             return np.zeros(0, np.uint8)
         if self._marks is None:  # the store may keep nothing
             of_view = self.scene, self.camera, film, self.settings, self.plan, self.store
-            self._marks = self.pool.run([lambda: marks_of(*of_view)])[0]
+            self._marks = marks_of(*of_view, self.pool.run)
         return self._marks
 
     def _eye_pass(self, rendered: RenderedPass, film: Film) -> None:

@@ -30,6 +30,7 @@ from pmviewer.render.path import path_pass
 from pmviewer.render.pixel_samples import own_eye
 from pmviewer.render.share import share_samples, weigh_samples
 from pmviewer.settings.access import Settings
+from pmviewer.tasks import Runner
 
 PIXELS_A_GATHER = 8
 """At least, where irradiance is cached: the others find it there."""
@@ -141,19 +142,20 @@ def outline_of(scene: OpenScene, camera: CameraPose, film: Film, settings: Setti
 
 
 def marks_of(
-    scene: OpenScene, camera: CameraPose, film: Film, settings: Settings, plan: Plan, store: StageStore
+    scene: OpenScene, camera: CameraPose, film: Film, settings: Settings, plan: Plan, store: StageStore, run: Runner
 ) -> NDArray[np.uint8]:
     """What the eye pass does more in which pixels (`pmviewer.render.pixel_samples`): uint8, empty where nothing. The
-    film may be smaller than the camera's picture."""
-    marks = outline_of(scene, camera, film, settings, store)
+    film may be smaller than the camera's picture. Raises Cancelled as `run` does."""
+    (marks,) = run([partial(outline_of, scene, camera, film, settings, store)])
     glossy = settings.photons.glossy
     small = replace(camera, width=film.width, height=film.height)
     more: list[tuple[Hashable, Callable[[], NDArray[np.uint8]]]] = []
     if plan.mirror_rays > 1:
-        more.append((("mirrors", scene.uid, small, glossy), lambda: mirrored_pixels(scene.flat, small, glossy)))
+        mirrored = partial(mirrored_pixels, scene.flat, small, glossy)
+        more.append((("mirrors", scene.uid, small, glossy), lambda: run([mirrored])[0]))
     if plan.edge_rays > 1:
         most = MOST_EDGED if settings.render.edge_rays == "auto" else 1.0
-        more.append((("edges", scene.uid, small, most), lambda: edged_pixels(scene.flat, small, most)))
+        more.append((("edges", scene.uid, small, most), lambda: edged_pixels(scene.flat, small, most, run)))
     for key, found in more:
         also = store.get(key, found, lambda pixels: pixels.nbytes)
         marks = marks | also if len(marks) and len(also) else marks if len(marks) else also
