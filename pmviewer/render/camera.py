@@ -147,9 +147,11 @@ class CameraPose:
     def seen_from(self, origin: NDArray[np.floating], direction: NDArray[np.floating]) -> NDArray[np.float64]:
         """From which distance on rays of the camera from `origin` (…, 3) in the unit `direction` (…, 3) see: (…), the
         near plane; infinity if they never pass it."""
+        if self.near <= 0:
+            return np.zeros(np.shape(direction)[:-1])
         normal = self.axes()[2] if self.near_normal is None else np.asarray(self.near_normal, float)
         towards = np.asarray(direction @ normal, float)
-        before = np.maximum(self.near - np.subtract(origin, self.origin) @ normal, 0.0) if self.near > 0 else 0.0
+        before = np.maximum(self.near - np.subtract(origin, self.origin) @ normal, 0.0)
         passes = np.where(towards > 0, before / np.where(towards > 0, towards, 1.0), math.inf)
         return np.where(before > 0, passes, 0.0)
 

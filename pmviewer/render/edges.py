@@ -61,8 +61,8 @@ def _unlike(surfaces, materials, i, j):
 
 @kernel
 def mark_crossed(scenes, hits, corners, crossed):
-    """Set crossed, bool (m,), where two of four hits are unlike. scenes: SCENE_DTYPE (1,); hits: `Hits` of n rays;
-    corners: int64 (m, 4), their numbers."""
+    """Set crossed, bool (m,), where two of four hits, one after the other, are unlike. scenes: SCENE_DTYPE (1,); hits:
+    `Hits` of n rays; corners: int64 (m, 4), the numbers of the four around a square."""
     scene, n = scenes[0], len(hits.prims)
     surfaces, materials = np.empty((n, 6), np.float32), np.empty(n, np.int32)
     o, d, uv = hits.origins, hits.directions, hits.uv
@@ -78,10 +78,9 @@ def mark_crossed(scenes, hits, corners, crossed):
             surfaces[i, 3], surfaces[i, 4], surfaces[i, 5] = ns
     for k in range(len(corners)):
         crossed[k] = False
-        for a in range(3):
-            for b in range(a + 1, 4):
-                if _unlike(surfaces, materials, corners[k, a], corners[k, b]):
-                    crossed[k] = True
+        for side in range(4):
+            if _unlike(surfaces, materials, corners[k, side], corners[k, (side + 1) & 3]):
+                crossed[k] = True
 
 
 def edged_pixels(scene: FlatScene, camera: CameraPose, most: float = 1.0, run: Runner = in_turn) -> NDArray[np.uint8]:
@@ -139,13 +138,14 @@ def _apart(scene: FlatScene, camera: CameraPose) -> NDArray[np.bool_]:
     x, y = (g.ravel() + 0.5 for g in np.meshgrid(np.arange(camera.width), np.arange(camera.height)))
     half = 0.5 * camera.pixel_side
     places = (np.stack([at - half, at - half, at + half, at + half], axis=1) for at in (x, y))
-    x, y = (at[:, order].ravel() for at, order in zip(places, ([0, 2, 1, 3], [0, 1, 2, 3]), strict=True))
+    x, y = (at[:, order].ravel() for at, order in zip(places, ([0, 2, 3, 1], [0, 1, 2, 3]), strict=True))
     return _crossed(scene, camera, x, y, np.arange(len(x)).reshape(-1, 4))
 
 
 def _square(first: NDArray[np.int64], stride: int) -> NDArray[np.int64]:
-    """(m, 4) numbers of the corners of squares of a lattice with so many points a row, from those of the first."""
-    return first[:, None] + np.array([0, 1, stride, stride + 1])
+    """(m, 4) numbers of the corners, one after the other, of squares of a lattice with so many points a row, from those
+    of the first."""
+    return first[:, None] + np.array([0, 1, stride + 1, stride])
 
 
 def _crossed(

@@ -181,7 +181,7 @@ class Gather(Group):
     cache_rays: int | Auto = setting(
         "auto",
         "Gather rays a pixel and pass where no record serves: at edges, where records would have to be as narrow as "
-        "what they see is near. Automatic: twice the usual number.",
+        "what they see is near. Automatic: twice the usual number, up to 16.",
         stage="image",
         scale="integer",
         unit="rays",
