@@ -26,6 +26,7 @@ from pmviewer.settings.access import Settings, with_values
 
 SCENES = ("cornell_diffuse", "cornell_caustic")
 RAYS = 64
+ONE_SAMPLE: dict[str, Any] = {"gather.rays": RAYS, "render.edge_rays": 1}
 """Rays of a gather, in the cache and without it."""
 FEWER, DIFFERENCE = 10.0, 2.0
 P3, P4 = (1e-2, 0.25), (1e-3, 2.8)
@@ -53,7 +54,7 @@ def _gathered(renderer: Renderer) -> NDArray[np.float64]:
 
 
 def _plain(opened: OpenScene, pool: WorkPool, seed: int, passes: int) -> tuple[NDArray[np.float64], Renderer]:
-    renderer = _renderer(opened, pool, {"gather.rays": RAYS, "render.seed": seed})
+    renderer = _renderer(opened, pool, {"render.seed": seed, **ONE_SAMPLE})
     for _ in range(passes):
         renderer.step()
     return _gathered(renderer), renderer
@@ -66,13 +67,14 @@ def difference(image: NDArray[np.float64], first: NDArray[np.float64], second: N
 
 
 def _gathers(opened: OpenScene, pool: WorkPool, passes: int) -> tuple[list[list[str | float | int]], list[Target]]:
-    """Rows and targets of one scene: the cache at passes 1, 2, 4, … against the plain gather after all passes."""
+    """Rows and targets of one scene: the cache at passes 1, 2, 4, … against the plain gather after all passes. Pixels
+    have one sample each, as those have that the source counts gathers of: more of them at edges are more gathers."""
     first, plain = _plain(opened, pool, 1, passes)
     second, _ = _plain(opened, pool, 2, passes)
     name = opened.scene.name
     plain_cpu = plain.tally.stage_seconds["camera pass"] / passes
     rows: list[list[str | float | int]] = [[name, "off", passes, "", 1.0, "", plain_cpu, "", ""]]
-    cached = _renderer(opened, pool, {"gather.cache": "on", "gather.cache_samples": RAYS, "gather.rays": RAYS})
+    cached = _renderer(opened, pool, {"gather.cache": "on", "gather.cache_samples": RAYS, **ONE_SAMPLE})
     fewer = percent = math.nan
     while cached.passes < passes:
         cached.step()
@@ -87,7 +89,7 @@ def _gathers(opened: OpenScene, pool: WorkPool, passes: int) -> tuple[list[list[
             ) / cached.passes
             share = 100 * statistics.interpolated
             rows.append([name, "on", cached.passes, statistics.cache_records, fewer, share, spent, percent, rms])
-    note = f"{name}, {cached.passes} passes, {RAYS} rays a gather"
+    note = f"{name}, {cached.passes} passes, {RAYS} rays a gather, render.edge_rays=1"
     targets = [Target("R6", fewer, FEWER, "times fewer gathers", True, note)]
     targets.append(Target("R6", percent, DIFFERENCE, "%", False, f"{note}: difference in indirect light"))
     return rows, targets

@@ -33,9 +33,9 @@ from pmviewer.settings.access import Settings
 from pmviewer.settings.schema import Gather
 
 CACHE_RAYS, MOST_CACHE_RAYS = 2, 16
-"""Times the usual gather rays where no record serves, up to so many. Variance times seconds over that with 4: 0.76 to 0.90
-in diffuse boxes and rooms (0.68 to 0.94 with four times as many), 0.96 to 1.06 in scenes whose noise is elsewhere (1.01
-to 1.12)."""
+"""Times the usual gather rays where no record serves, up to so many. Variance times seconds over that with 4 rays: 0.76
+to 0.90 in diffuse boxes and rooms (0.68 to 0.94 with four times as many), 0.96 to 1.06 in scenes whose noise is
+elsewhere (1.01 to 1.12)."""
 
 
 @dataclass(frozen=True, eq=False)
