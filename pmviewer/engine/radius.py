@@ -81,10 +81,9 @@ def seen_from(
     and primitives (n,) of those that meet something."""
     u = (np.arange(probes) + 0.5) / probes
     x, y = (g.reshape(-1) for g in np.meshgrid(u * camera.width, u * camera.height))
-    origins, directions = (np.asarray(part, np.float32) for part in camera.rays(x, y))
-    _, _, t, prims, _ = closest_hits(scene.record[0], origins, directions)
-    met = prims >= 0
-    return origins[met], directions[met], t[met], prims[met]
+    hits = closest_hits(scene.record[0], *camera.rays(x, y))
+    met = hits.prims >= 0
+    return hits.origins[met], hits.directions[met], hits.t[met], hits.prims[met]
 
 
 def typical_distance(scene: FlatScene, camera: CameraPose) -> float:

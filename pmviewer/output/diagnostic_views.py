@@ -208,7 +208,7 @@ DIAGNOSTICS: Mapping[str, DiagnosticView] = {
     ),
     "samples a pass": DiagnosticView(
         "samples",
-        "samples of the pixel in the latest pass: of what shows mirrors or glass, and adapted to the noise",
+        "samples of the pixel in the latest pass: more at mirrors, glass and edges, and where it is noisy",
         "samples",
         "not rendered",
         log=True,

@@ -113,9 +113,9 @@ def _points(scene: Scene, flat: FlatScene, rng: np.random.Generator) -> Float:
         starts = np.repeat(found[-1], RAYS, axis=0)
         away = rng.standard_normal(starts.shape)
         away /= np.linalg.norm(away, axis=1, keepdims=True)
-        _, _, t, prims, _ = closest_hits(flat.record[0], starts, away)
-        met = (prims >= 0) & (t > BACK * flat.radius)
-        found.append(starts[met] + away[met] * (t[met] * (1 - BACK))[:, None])
+        hits = closest_hits(flat.record[0], starts, away)
+        met = (hits.prims >= 0) & (hits.t > BACK * flat.radius)
+        found.append(starts[met] + away[met] * (hits.t[met] * (1 - BACK))[:, None])
     return np.concatenate(found).astype(np.float64)
 
 
