@@ -285,7 +285,8 @@ class Renderer:
         film = film_of(self.settings, self.plan, small.width, small.height)
         N = min(self.settings.photons.N, COARSE_PHOTONS)
         first = self.settled_radii.scaled(min(2.0, (self.settings.photons.N / N) ** 0.25))
-        quick = Renderer(self.scene, self.settings, self.pool, self.store, self.version, self.plan, first)
+        plan = replace(self.plan, edge_rays=1)  # it is blurred anyway
+        quick = Renderer(self.scene, self.settings, self.pool, self.store, self.version, plan, first)
         quick.settled_radii = self.settled_radii
         quick._pass(film, small, 0, N)
         self.coarse_pass = quick.latest

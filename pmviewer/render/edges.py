@@ -101,8 +101,11 @@ def edged_pixels(scene: FlatScene, camera: CameraPose, most: float = 1.0, run: R
 def _crossed_rows(scene: FlatScene, camera: CameraPose, rows: tuple[int, int], block: int) -> NDArray[np.bool_]:
     """(width · rows,), of pixels of the rows from the first to before the last, which lie side by side."""
     first, last = rows
+    squares = _crossed_squares(scene, camera, rows, block)
+    if block == 1:
+        return squares.ravel()
     found = np.zeros(camera.width * (last - first), bool)
-    pixels = np.flatnonzero(_crossed_squares(scene, camera, rows, block))
+    pixels = np.flatnonzero(squares)
     found[pixels] = _crossed_pixels(scene, camera, rows, pixels)
     return found
 
