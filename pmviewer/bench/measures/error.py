@@ -68,6 +68,10 @@ CHOSEN_WITH = (
 powers of `model` and `measured`; that FEWER_PHOTONS of `choose` does not count for an error, and EVEN of `model`."""
 HELD = "how many photons look-ups of maps that are shown hold at first, and how few trajectories tell it"
 """HELD, CAUSTIC_HELD and FEW_TRACED of `pmviewer.engine.stages.spread`: with all of `SCENES`, and for every method."""
+WITH_EDGES = ("cornell_diffuse", "cornell_caustic", "rooms_10x10")
+EDGES = "how many samples pixels with edges have, and gather rays without a record of the cache"
+"""EDGE_RAYS of `pmviewer.engine.method` and MOST_EDGED of `pmviewer.render.edges`, for every method but the path tracer;
+CACHE_RAYS of `pmviewer.engine.stages.pass_data`. With `WITH_EDGES`."""
 AUTOMATIC_BUDGET = 8.0
 """Of the curves by what automatic mode chooses, over their target's seconds."""
 
@@ -186,7 +190,8 @@ def chosen_with(best: Curve) -> str:
     """What of a curve's way of rendering was chosen with its scene, as an end of its target's line."""
     by_choice = best.method.startswith(AUTOMATIC)
     found = [what for scenes, what in CHOSEN_WITH if by_choice and best.scene in scenes]
-    return (TRIAL_APART if by_choice else "") + "; chosen with this scene among others: " + "; ".join((*found, HELD))
+    found += [HELD, EDGES] if best.scene in WITH_EDGES else [HELD]
+    return (TRIAL_APART if by_choice else "") + "; chosen with this scene among others: " + "; ".join(found)
 
 
 def against_peer(curves: list[Curve], peers: list[Curve]) -> list[Target]:

@@ -26,8 +26,9 @@ from pmviewer.settings.access import Settings, with_values
 
 SCENES = ("cornell_diffuse", "cornell_caustic")
 RAYS = 64
-ONE_SAMPLE: dict[str, Any] = {"gather.rays": RAYS, "render.edge_rays": 1}
 """Rays of a gather, in the cache and without it."""
+COUNTED: dict[str, Any] = {"gather.rays": RAYS, "render.edge_rays": 1}
+"""Where gathers are counted, pixels have one sample."""
 FEWER, DIFFERENCE = 10.0, 2.0
 P3, P4 = (1e-2, 0.25), (1e-3, 2.8)
 """relMSE and CPU seconds on the first scene."""
@@ -54,7 +55,7 @@ def _gathered(renderer: Renderer) -> NDArray[np.float64]:
 
 
 def _plain(opened: OpenScene, pool: WorkPool, seed: int, passes: int) -> tuple[NDArray[np.float64], Renderer]:
-    renderer = _renderer(opened, pool, {"render.seed": seed, **ONE_SAMPLE})
+    renderer = _renderer(opened, pool, {"render.seed": seed, **COUNTED})
     for _ in range(passes):
         renderer.step()
     return _gathered(renderer), renderer
@@ -74,7 +75,7 @@ def _gathers(opened: OpenScene, pool: WorkPool, passes: int) -> tuple[list[list[
     name = opened.scene.name
     plain_cpu = plain.tally.stage_seconds["camera pass"] / passes
     rows: list[list[str | float | int]] = [[name, "off", passes, "", 1.0, "", plain_cpu, "", ""]]
-    cached = _renderer(opened, pool, {"gather.cache": "on", "gather.cache_samples": RAYS, **ONE_SAMPLE})
+    cached = _renderer(opened, pool, {"gather.cache": "on", "gather.cache_samples": RAYS, **COUNTED})
     fewer = percent = math.nan
     while cached.passes < passes:
         cached.step()
