@@ -11,7 +11,8 @@ from pmviewer.engine.diagnose import Looked
 from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
 from pmviewer.engine.radius import FirstRadii
-from pmviewer.engine.stages.pass_data import RenderedPass, cache_rays
+from pmviewer.engine.stages.irradiance_cache import cache_rays
+from pmviewer.engine.stages.pass_data import RenderedPass
 from pmviewer.engine.stages.radiance_photons import AUTOMATIC_CUTOFF, AUTOMATIC_CUTOFF_NEAREST
 from pmviewer.maps.search.grid import PhotonGrid
 from pmviewer.photons.bounces import most_bounces

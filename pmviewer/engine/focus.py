@@ -40,12 +40,9 @@ def distance_at(scene: FlatScene, camera: CameraPose, x: float, y: float) -> flo
 def surface_at(scene: FlatScene, camera: CameraPose, x: float, y: float) -> NDArray[np.float64] | None:
     """The point (3,) of the first surface at a place of the picture, in pixels, for a pinhole; None where there is
     none."""
-    from pmviewer.kernels.accel.raycast import cast_closest
+    from pmviewer.render.closest_hits import closest_hits
 
-    origin, direction = (np.ascontiguousarray(part, np.float32) for part in camera.rays(np.array([x]), np.array([y])))
-    forward = camera.axes()[2]
-    near = camera.seen_from(origin, direction).astype(np.float32)
-    far = np.array([camera.far / float(direction[0] @ forward)], np.float32)
-    t, prim, uv = np.empty(1, np.float32), np.empty(1, np.int32), np.empty((1, 2), np.float32)
-    cast_closest(scene.record[0], origin, direction, near, far, t, prim, uv)
-    return np.asarray(origin[0] + t[0] * direction[0], float) if prim[0] >= 0 else None
+    origins, directions = camera.rays(np.array([x]), np.array([y]))
+    near, far = camera.seen_from(origins, directions), camera.far / (directions @ camera.axes()[2])
+    hits = closest_hits(scene.record[0], origins, directions, far, near)
+    return np.asarray(hits.origins[0] + hits.t[0] * hits.directions[0], float) if hits.prims[0] >= 0 else None

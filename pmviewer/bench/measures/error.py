@@ -70,8 +70,8 @@ HELD = "how many photons look-ups of maps that are shown hold at first, and how 
 """HELD, CAUSTIC_HELD and FEW_TRACED of `pmviewer.engine.stages.spread`: with all of `SCENES`, and for every method."""
 WITH_EDGES = ("cornell_diffuse", "cornell_caustic", "rooms_10x10")
 EDGES = "how many samples pixels with edges have, and gather rays without a record of the cache"
-"""EDGE_RAYS of `pmviewer.engine.method` and MOST_EDGED of `pmviewer.render.edges`, for every method but the path tracer;
-CACHE_RAYS of `pmviewer.engine.stages.pass_data`. With `WITH_EDGES`."""
+"""EDGE_RAYS of `pmviewer.engine.method`, MOST_EDGED of `pmviewer.render.edges` and CACHE_RAYS of
+`pmviewer.engine.stages.irradiance_cache`: with `WITH_EDGES` among others."""
 AUTOMATIC_BUDGET = 8.0
 """Of the curves by what automatic mode chooses, over their target's seconds."""
 

@@ -45,7 +45,18 @@ BATCH_RAYS = 8192
 TASKS = 4
 """A thread and round, at least: the first round has few candidates, and gathers at each."""
 
+CACHE_RAYS, MOST_CACHE_RAYS = 2, 16
+"""Times the usual gather rays where no record serves, up to so many. Variance times seconds over that with 4 rays: 0.76
+to 0.90 in diffuse boxes and rooms (0.68 to 0.94 with four times as many), 0.96 to 1.06 in scenes whose noise is
+elsewhere (1.01 to 1.12)."""
 _f4 = np.float32
+
+
+def cache_rays(gather: Gather) -> int:
+    """Rays of diffuse surfaces where the irradiance cache has no record for them."""
+    if gather.cache_rays == "auto":
+        return max(gather.rays, min(CACHE_RAYS * gather.rays, MOST_CACHE_RAYS))
+    return int(gather.cache_rays)
 
 
 def recipe(gather: Gather, camera: CameraPose, index: int) -> NDArray[np.void]:

@@ -12,6 +12,7 @@ from pmviewer.engine.method import Plan
 from pmviewer.engine.radius import volume_neighbours
 from pmviewer.engine.stages.estimation import Estimates, blank_estimates
 from pmviewer.engine.stages.gather_guides import gather_records
+from pmviewer.engine.stages.irradiance_cache import cache_rays
 from pmviewer.engine.stages.pass_maps import LookUpMap, PassMaps, Structure, blank_grid, blank_maps
 from pmviewer.engine.stages.shadow_photons import ShadowMap
 from pmviewer.engine.stages.virtual_lights import VirtualMap, blank_photons, virtual_dtype
@@ -30,12 +31,6 @@ from pmviewer.render.media.march import march_record
 from pmviewer.render.pixel_samples import samples_by_marks
 from pmviewer.render.record import Evaluation, eye_dtype, eye_record
 from pmviewer.settings.access import Settings
-from pmviewer.settings.schema import Gather
-
-CACHE_RAYS, MOST_CACHE_RAYS = 2, 16
-"""Times the usual gather rays where no record serves, up to so many. Variance times seconds over that with 4 rays: 0.76
-to 0.90 in diffuse boxes and rooms (0.68 to 0.94 with four times as many), 0.96 to 1.06 in scenes whose noise is
-elsewhere (1.01 to 1.12)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,13 +58,6 @@ class RenderedPass:
 def pass_record(camera: CameraPose, settings: Settings, plan: Plan, maps: PassMaps, index: int) -> NDArray[np.void]:
     """The eye record (1,) of pass `index`, which looks these maps up."""
     return eye_record(camera, settings, index, _evaluation(settings, plan, maps, index))
-
-
-def cache_rays(gather: Gather) -> int:
-    """Rays of diffuse surfaces where the irradiance cache has no record for them."""
-    if gather.cache_rays == "auto":
-        return max(gather.rays, min(CACHE_RAYS * gather.rays, MOST_CACHE_RAYS))
-    return int(gather.cache_rays)
 
 
 def _evaluation(settings: Settings, plan: Plan, maps: PassMaps, index: int) -> Evaluation:
