@@ -46,6 +46,23 @@ def test_independent_passes_have_the_error_that_they_are_estimated_to_have(corne
     assert error.latest.relmse == pytest.approx(expected, rel=0.45)
 
 
+@pytest.mark.parametrize("wide", [1, 2, 16])
+def test_the_noise_of_a_picture_of_contrasts_is_relative_to_each_pixel(cornell, wide):
+    """Stripes of 0.1 and 1, each with noise of a fifth of itself: what is around a pixel is not what it shows."""
+    rng = np.random.default_rng(wide)
+    w = h = 64
+    truth = np.repeat(np.where(np.arange(w) // wide % 2, 1.0, 0.1)[None], h, axis=0).reshape(-1, 1) * np.ones(3)
+    film = noted(w, h)
+    error = ErrorEstimate(w, h, Settings(), plan_of(Settings(), cornell.traits))
+    for _ in range(16):
+        film.sums[:, 0:3] += truth * rng.normal(1.0, 0.2, truth.shape)
+        add(film)
+        error.add(film)
+    expected = float((0.04 / 16 * truth**2 / (truth**2 + EPSILON)).mean())
+    assert error.latest is not None
+    assert error.latest.relmse == pytest.approx(expected, rel=0.3)
+
+
 def test_one_bright_pixel_does_not_hide_in_its_own_brightness(cornell):
     """A pixel that is a hundred times too bright once is wrong by far more than its own size says."""
     film = noted(32, 32)

@@ -43,7 +43,8 @@ ROUGHNESS = 0.2
 UNSURE = 0.35
 """Relative error of an estimate by one value of D beside that; it falls with the root of their number."""
 AROUND = (3, 7)
-"""Pixels along the sides of the boxes whose means stand for the truth that errors are relative to."""
+"""Pixels along the sides of the boxes whose means, the lesser of both, stand for what a noisy pixel ought to show."""
+NEIGHBOURS = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], bool)
 BLOCKS = 8
 """Blocks along each side of the picture whose differences tell how well D is known."""
 BAND = 16
@@ -142,18 +143,27 @@ def _is_level(n: int) -> bool:
 def _of_band(first: F8, total: F8, m: int, begin: int) -> F8:
     """Relative squared differences, in BAND rows, of m passes, whose sum is `first`, against the m passes after them;
     `total` is the sum of both. The mean over channels."""
-    from scipy.ndimage import uniform_filter  # late: processes that only compile, or wait for work, start without
-
     end, reach = min(begin + BAND, len(total)), max(AROUND) // 2
     top, bottom = max(begin - reach, 0), min(end + reach, len(total))
     asked = slice(begin - top, end - top)
     plane = np.zeros((end - begin, total.shape[1]))
     for c in range(3):
         mean = total[top:bottom, :, c] / (2 * m)
-        around = np.minimum(*(uniform_filter(mean, size)[asked] for size in AROUND))
-        square = (2 * first[begin:end, :, c] - total[begin:end, :, c]) ** 2 / (2 * m * m)
-        plane += square / (around**2 + EPSILON) / 3
+        square = (2 * first[top:bottom, :, c] - total[top:bottom, :, c]) ** 2 / (2 * m * m)
+        plane += (square / (_seen(mean, square / 2) ** 2 + EPSILON))[asked] / 3
     return plane
+
+
+def _seen(mean: F8, variance: F8) -> F8:
+    """What the pixels (h, w) of that mean and about that variance show: what those around them do, and what they differ
+    by from these as far as it stands out of the noise there (Wiener). A pixel that is brighter than all of its
+    neighbours counts as the brightest of them: what one path made would hide in its own brightness."""
+    from scipy.ndimage import maximum_filter, uniform_filter  # late: processes that only compile start without
+
+    around = np.minimum(*(uniform_filter(mean, size) for size in AROUND))
+    own = np.minimum(mean, maximum_filter(mean, footprint=NEIGHBOURS, mode="mirror")) - around
+    certain = own**2 / np.maximum(own**2 + uniform_filter(variance, AROUND[0]), EPSILON**2)
+    return np.asarray(around + certain * own)
 
 
 def _level(plane: F8, m: int) -> _Level:
