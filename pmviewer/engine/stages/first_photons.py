@@ -10,7 +10,7 @@ from pmviewer.engine.stages.projection import projection_for
 from pmviewer.engine.stages.tracer import Tracer
 from pmviewer.engine.store import StageStore
 from pmviewer.photons.light_pass.photon_maps import PhotonMaps
-from pmviewer.settings.access import SETTINGS, Settings, with_values
+from pmviewer.settings.access import SETTINGS, Settings
 from pmviewer.tasks import Runner
 
 TRACED = 40_000
@@ -19,9 +19,10 @@ TRACED = 40_000
 
 def _tracer(scene: OpenScene, settings: Settings, plan: Plan, run: Runner) -> Tracer:
     """With the default N, q and seed."""
-    default = {name: SETTINGS[name].default for name in ("photons.N", "photons.q", "render.seed")}
-    tried = with_values(settings, default)
-    return Tracer(scene.flat, tried, plan, projection_for(scene, tried), run)
+    photons = settings.photons.model_copy(update={name: SETTINGS[f"photons.{name}"].default for name in ("N", "q")})
+    render = settings.render.model_copy(update={"seed": SETTINGS["render.seed"].default})
+    tried = settings.model_copy(update={"photons": photons, "render": render})
+    return Tracer(scene.flat, tried, plan, projection_for(scene, tried, plan), run)
 
 
 def traced(

@@ -35,7 +35,7 @@ class LightStage:
         self, scene: OpenScene, settings: Settings, plan: Plan, pool: WorkPool, store: StageStore, tally: Tally
     ) -> None:
         self.scene, self.settings, self.plan, self.pool, self.tally = scene, settings, plan, pool, tally
-        self.tracer = Tracer(scene.flat, settings, plan, projection_for(scene, settings), pool.run)
+        self.tracer = Tracer(scene.flat, settings, plan, projection_for(scene, settings, plan), pool.run)
         self.builder = MapBuilder(scene, settings, plan, pool, store)
         self.places = light_places(scene.flat) if plan.importance else None
         self.latest: PassMaps | None = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pmviewer.engine.method import plan_of
+from pmviewer.engine.method import Plan, plan_of
 from pmviewer.engine.opened import OpenScene
 from pmviewer.photons.light_pass.plan import trajectories
 from pmviewer.photons.projection.aim import MOST_LIGHTS
@@ -10,9 +10,9 @@ from pmviewer.photons.projection.projection import Projection, projection_of
 from pmviewer.settings.access import Settings
 
 
-def projection_for(scene: OpenScene, settings: Settings) -> Projection | None:
-    """The maps for these settings; None where photons start everywhere."""
-    wanted, plan = settings.photons.projection, plan_of(settings, scene.traits)
+def projection_for(scene: OpenScene, settings: Settings, plan: Plan | None = None) -> Projection | None:
+    """The maps for these settings, and their plan if it is at hand; None where photons start everywhere."""
+    wanted, plan = settings.photons.projection, plan or plan_of(settings, scene.traits)
     if wanted == "off" or not plan.photons or plan.emission != "off":
         return None
     if wanted == "auto" and len(scene.flat.light_names) > MOST_LIGHTS:

@@ -49,6 +49,8 @@ NEAREST = 4
 """Photons that are looked at around each place."""
 LEAKING = 0.3
 """Share of them that may lie behind something."""
+TABLE = 1 << 15
+"""Distances that are known at a time."""
 PROBES = 12
 """Places along each side of the picture, and the square root of the photons of caustics that are looked around."""
 SHORT = 0.05
@@ -167,15 +169,16 @@ def _nearest(
     places: NDArray[np.float64], photons: NDArray[np.float32], k: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Of the photons (m, 3) the k nearest to each place (n, 3), in order: numbers and distances (n, k)."""
-    near, distances = np.empty((len(places), k), np.int64), np.empty((len(places), k))
-    columns = [np.ascontiguousarray(column) for column in photons.T]
-    for i, place in enumerate(places.astype(np.float32)):
-        apart = sum((column - x) ** 2 for column, x in zip(columns, place, strict=True))
+    near, rows = np.empty((len(places), k), np.int64), np.arange(len(places))
+    columns, size = np.ascontiguousarray(photons.T), max(TABLE // len(photons), 1)
+    half = 0.5 * (columns**2).sum(axis=0)
+    for first in range(0, len(places), size):
+        part = rows[first : first + size]
+        apart = half - places[part].astype(np.float32) @ columns  # (|p - x|² - |x|²)/2
         for j in range(k):
-            near[i, j] = apart.argmin()
-            distances[i, j] = np.sqrt(apart[near[i, j]])
-            apart[near[i, j]] = np.inf
-    return near, distances
+            near[part, j] = apart.argmin(axis=1)
+            apart[part - first, near[part, j]] = np.inf
+    return near, np.linalg.norm(photons[near] - places[:, None], axis=2)
 
 
 def _hidden(record: NDArray[np.void], starts: NDArray[np.float64], ends: NDArray[np.float32]) -> NDArray[np.bool_]:
