@@ -139,10 +139,11 @@ class CameraPose:
     def rays(self, x: NDArray[np.number], y: NDArray[np.number]) -> tuple[Matrix, Matrix]:
         """Origins and unit directions (n, 3) of the rays through places (n,) of the image, in pixels."""
         eye, corner, right, down = self.ray_frame()
-        places = corner + np.asarray(x, float)[:, None] * right + np.asarray(y, float)[:, None] * down
+        # A row for each coordinate: numpy takes several times as long for rows of three.
+        places = corner[:, None] + np.asarray(x, float) * right[:, None] + np.asarray(y, float) * down[:, None]
         if self.orthographic:
-            return eye + places, np.broadcast_to(self.axes()[2], places.shape).copy()
-        return np.broadcast_to(eye, places.shape).copy(), places / np.linalg.norm(places, axis=1, keepdims=True)
+            return (eye[:, None] + places).T.copy(), np.tile(self.axes()[2], (places.shape[1], 1))
+        return np.tile(eye, (places.shape[1], 1)), (places / np.sqrt((places**2).sum(axis=0))).T.copy()
 
     def seen_from(self, origin: NDArray[np.floating], direction: NDArray[np.floating]) -> NDArray[np.float64]:
         """From which distance on rays of the camera from `origin` (…, 3) in the unit `direction` (…, 3) see: (…), the
