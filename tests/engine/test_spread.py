@@ -12,7 +12,7 @@ from pmviewer.engine.opened import open_scene
 from pmviewer.engine.radius import seen_from
 from pmviewer.engine.renderer import Renderer
 from pmviewer.engine.stages import spread
-from pmviewer.engine.stages.spread import FEW_TRACED, MOST, TRACED
+from pmviewer.engine.stages.spread import FEW_TRACED, MOST, TRACED, _nearest
 from pmviewer.engine.stages.tracer import Tracer
 from pmviewer.engine.store import StageStore
 from pmviewer.output.metric import relmse
@@ -158,3 +158,15 @@ def test_radii_stay_when_one_of_three_glasses_moves(pool):
     """Photons around the others are the same, and so are the look-ups that find them (T2)."""
     moved = [made(open_scene("three_glasses", {"x": x}), pool).settled_radii for x in ("0", "0.0025", "0.01")]
     assert moved[1:] == moved[:1] * 2
+
+
+@pytest.mark.parametrize("away", [0.0, 1e4])
+def test_the_nearest_are_found_far_from_the_middle_too(away):
+    """Against all distances, sorted; a stage may lie at the rim of a wide floor."""
+    rng = np.random.default_rng(5)
+    photons = (rng.normal(size=(3000, 3)) + [away, 0, 0]).astype(np.float32)
+    places = rng.normal(size=(150, 3)) + [away, 0, 0]
+    near, distances = _nearest(places, photons, 4)
+    apart = np.sqrt(((places[:, None] - photons.astype(np.float64)) ** 2).sum(axis=2))
+    assert np.array_equal(near, np.argsort(apart, axis=1)[:, :4])
+    assert distances == pytest.approx(np.sort(apart, axis=1)[:, :4], rel=1e-6)

@@ -170,11 +170,11 @@ def _nearest(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Of the photons (m, 3) the k nearest to each place (n, 3), in order: numbers and distances (n, k)."""
     near, rows = np.empty((len(places), k), np.int64), np.arange(len(places))
-    columns, size = np.ascontiguousarray(photons.T), max(TABLE // len(photons), 1)
+    columns, size = photons.T.astype(np.float64), max(TABLE // len(photons), 1)
     half = 0.5 * (columns**2).sum(axis=0)
     for first in range(0, len(places), size):
         part = rows[first : first + size]
-        apart = half - places[part].astype(np.float32) @ columns  # (|p - x|² - |x|²)/2
+        apart = half - places[part] @ columns  # (|p - x|² - |x|²)/2, small beside both: not of single precision
         for j in range(k):
             near[part, j] = apart.argmin(axis=1)
             apart[part - first, near[part, j]] = np.inf
