@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from pmviewer.engine.diagnose import Looked
-from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.radius import FirstRadii
 from pmviewer.engine.stages.irradiance_cache import cache_rays
 from pmviewer.engine.stages.pass_data import RenderedPass

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pmviewer.engine.energy import Energy
-from pmviewer.engine.method import Plan
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.tally import Tally
 from pmviewer.photons.bounces import most_bounces
 from pmviewer.settings.access import Settings

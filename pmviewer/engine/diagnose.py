@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from pmviewer.engine.inspection import Inspection, Wanted
 from pmviewer.engine.inspector.pixel import pixel_report
 from pmviewer.engine.inspector.watched import Watched
-from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.stages.convergence import convergence_plane
 from pmviewer.engine.stages.eye import gather_rays_of

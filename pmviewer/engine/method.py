@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from dataclasses import replace
+from typing import NamedTuple
 
-from pmviewer.engine.look_up_plan import NEIGHBOURS, estimator_of, first_neighbours, reaches_to_nearest
+from pmviewer.engine.look_up_plan import estimator_of, first_neighbours, reaches_to_nearest
 from pmviewer.engine.media_plan import BLURRED, BLURRED_FROM, THIN, in_media
+from pmviewer.engine.plan import Plan
 from pmviewer.maps.record import CAUSTIC, DIRECT, INDIRECT, INDIRECT_CAUSTIC
 from pmviewer.render.camera import are_hidden
 from pmviewer.render.direct.choice import ASKING, LISTED
@@ -16,7 +17,7 @@ from pmviewer.scene.analysis import SceneTraits
 from pmviewer.scene.description import PixelFilter
 from pmviewer.settings.access import Settings, needs_of, with_values
 from pmviewer.settings.needs import Facts, unmet
-from pmviewer.settings.schema.importance import WITHOUT_IMPORTANCE, Deposit
+from pmviewer.settings.schema.importance import WITHOUT_IMPORTANCE
 
 MANY_LIGHTS = 8
 """From so many lights on, the automatic choice of lights asks the photons."""
@@ -24,7 +25,6 @@ REFLECTING = "tinted and reflecting"
 EXACT_GLASS = ("path", "virtual lights")
 """Methods that let no light pass thin glass by other rules than it would."""
 EXPONENTS = {"off": 0, "square": 2, "cube": 3}
-Emission = Literal["off", "Peter-Pietrek", "Christensen discard", "Christensen keep"]
 UNFOUND_BY_PATHS = (
     "The path tracer finds no light that comes from a point, spot or directional light over a mirror or through glass: "
     "no ray can meet such a light. The photon methods show it."
@@ -35,136 +35,6 @@ ALL = 1 << DIRECT | 1 << CAUSTIC | 1 << INDIRECT | 1 << INDIRECT_CAUSTIC
 
 MIRROR_RAYS, EDGE_RAYS = 2, 2
 """Samples a pass where mirrors and glass are seen, automatic."""
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Masks are bit sets of path classes (`1 << class`). `caustic_mask` of the caustic map, `global_mask` as indirect
-    light, `direct_mask` as direct light and `global_caustics` as caustics of the global map are shown directly;
-    `caustic_classes` and `global_classes` are what the maps have to hold, 0 means that the map is not built. `direct`
-    is whether direct light is sampled at lobes that photons are stored for, `followed_direct` whether at those that are
-    followed; `unfound` whether these look up what no path finds (`pmviewer.render.reflect`). `choice` is how direct
-    light chooses lights, `light_samples` how many of it a surface takes in a pass, `radiance` whether gather rays use
-    radiance photons, `directions` how they look about: photons of the classes `guide_mask` guide `guided_rays` of them;
-    `corners` is whether short ones gather again, `cache` whether diffuse surfaces gather through an irradiance cache,
-    `estimation` whether pixels that show them are interpolated between sparse gathers, `reprojection` whether these
-    take hit points of one another, `shadows` whether shadow photons save shadow rays, `importance` whether there are
-    importance maps, `deposition` which photons maps store, `emission` how importance guides it, `convergence` the
-    exponent of the caustic map's convergence criterion, 0 without; `virtual` is whether virtual lights bring the
-    indirect light; `media` whether the scene has participating media, and `volume` whether photons are stored in them
-    and light that they scatter is looked up, `phase_rays` whether rays by phase functions can meet a light,
-    `looked_for` whether direct light is looked for by rays whatever `direct.mis` says; `dispersion` whether glass
-    splits light into colours; `lens` whether the render camera has one, `filtered` whether the film has another
-    reconstruction filter than the plain box, `moments` whether the film keeps what passes tell of its noise, `split`
-    whether camera paths go both ways at glass, `mirror_rays` and `edge_rays` how many samples a pass pixels have that
-    show a mirror or glass, and that edges cross, `one_sample` whether something forbids more than one, and `adaptive`
-    whether noisy pixels get more (`pmviewer.render.adaptive`); `hides` whether the picture shows no lights;
-    `nearest` is whether look-ups reach to the nearest photons, however far these are, to `neighbours` in the first
-    pass;
-    `thin_glass` are the rules by which light passes panes of glass, () where all of it is exact; `maps` is how many
-    parts of the light pass have photon maps of their own; `warnings` are sentences for the log about what was asked for
-    and can't be."""
-
-    path: bool = False
-    direct: bool = False
-    followed_direct: bool = False
-    unfound: bool = False
-    gather: bool = False
-    radiance: bool = False
-    directions: Literal["BSDF", "photon cones", "hemisphere grid"] = "BSDF"
-    guided_rays: int = 0
-    guide_mask: int = 0
-    corners: bool = False
-    cache: bool = False
-    estimation: bool = False
-    reprojection: bool = False
-    virtual: bool = False
-    thin_glass: tuple[str, ...] = ()
-    shadows: bool = False
-    importance: bool = False
-    deposition: Deposit = "all"
-    emission: Emission = "off"
-    convergence: int = 0
-    nearest: bool = False
-    neighbours: int = NEIGHBOURS
-    lens: bool = False
-    filtered: bool = False
-    moments: bool = True
-    split: bool = False
-    hides: bool = False
-    one_sample: bool = False
-    mirror_rays: int = 1
-    edge_rays: int = 1
-    adaptive: bool = False
-    media: bool = False
-    volume: bool = False
-    phase_rays: bool = False
-    looked_for: bool = False
-    dispersion: bool = False
-    caustic_mask: int = 0
-    global_mask: int = 0
-    direct_mask: int = 0
-    global_caustics: int = 0
-    global_classes: int = 0
-    choice: str = "power"
-    light_samples: int = 1
-    maps: int = 1
-    skipped: tuple[tuple[str, str], ...] = ()
-    warnings: tuple[str, ...] = ()
-
-    @property
-    def caustic_classes(self) -> int:
-        """Path classes that the caustic map holds."""
-        return self.caustic_mask | (1 << CAUSTIC if self.unfound else 0)
-
-    @property
-    def shown_directly(self) -> int:
-        """Path classes that are looked up in the global map where a pixel sees it."""
-        return self.global_mask | self.direct_mask | self.global_caustics
-
-    @property
-    def photons(self) -> bool:
-        """Whether any are traced."""
-        return bool(self.caustic_classes or self.global_classes or self.volume)
-
-    @property
-    def asks_photons(self) -> bool:
-        """Whether photons tell which lights to sample."""
-        return self.choice in ASKING
-
-    @property
-    def judges(self) -> bool:
-        """Whether a rule decides which photons are stored."""
-        return self.deposition != "all" or self.emission not in ("off", "Peter-Pietrek")
-
-    @property
-    def banded(self) -> bool:
-        """Whether stored photons tell their wavelengths: rules that write powers anew lose them."""
-        return self.dispersion and not self.chooses_photons
-
-    @property
-    def chooses_photons(self) -> bool:
-        """Whether there would be other photons without the group `importance` of the settings."""
-        return self.deposition != "all" or self.emission != "off"
-
-    @property
-    def running(self) -> tuple[str, ...]:
-        """Names of the stages that run."""
-        stages = {
-            "light pass": self.photons,
-            "caustic map": self.caustic_classes,
-            "global map": self.global_classes,
-            "volume map": self.volume,
-            "direct light": self.direct,
-            "light choice by photons": self.asks_photons,
-            "final gather": self.gather,
-            "irradiance cache": self.cache,
-            "gather estimation": self.estimation,
-            "gather reprojection": self.reprojection,
-            "importance": self.importance,
-            "path tracer": self.path,
-        }
-        return tuple(name for name, runs in stages.items() if runs)
 
 
 def plan_of(settings: Settings, traits: SceneTraits) -> Plan:

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.method import Plan, plan_of, radii_of_pixels
+from pmviewer.engine.method import plan_of, radii_of_pixels
 from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.stages.convergence import prepare_convergence
 from pmviewer.engine.stages.estimation import prepare_estimation

@@ -26,8 +26,9 @@ from pmviewer.engine.inspection import Inspection, Wanted
 from pmviewer.engine.inspector.watched import Watched
 from pmviewer.engine.make_frame import frame_of
 from pmviewer.engine.memory import check_memory
-from pmviewer.engine.method import Plan, plan_of, radii_of_pixels
+from pmviewer.engine.method import plan_of, radii_of_pixels
 from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.radius import NO_RADII, FirstRadii
 from pmviewer.engine.stages.eye import gather_rays_of, marks_of, render_into
@@ -104,7 +105,9 @@ class Renderer:
             self.film.region = settings.region.pixels(self.camera.width, self.camera.height)
         if self.plan.moments:
             self.film.moments = Moments(len(self.film.sums), self.film.refined)
-        self.error = ErrorEstimate(self.camera.width, self.camera.height, settings, self.plan)
+        chosen = filter_of(self.camera.filter, settings.render)
+        self._reach = reach_of(chosen, self.camera.pixel_side) if self.plan.filtered else 0
+        self.error = ErrorEstimate(self.camera.width, self.camera.height, settings, self.plan, self._reach)
         self.error.bias = scene.biases.get(way_of(settings)) if scene.biases else None
         self.tally = Tally()
         radii = first or NO_RADII
@@ -231,10 +234,8 @@ class Renderer:
         marks, plan = self._still_marks(film), self.plan
         marks = marks if len(marks) else np.zeros(len(film.sums), np.uint8)
         samples = samples_by_marks(marks, plan.mirror_rays, plan.edge_rays)
-        chosen = filter_of(self.camera.filter, self.settings.render)
-        reach = reach_of(chosen, self.camera.pixel_side) if self.plan.filtered else 0
         cost = cost_of(samples, film.sums[:, PLANES["normal"]] / film.passes)
-        made = partial(doublings_of, film.moments, (film.height, film.width), cost, reach, film.refined)
+        made = partial(doublings_of, film.moments, (film.height, film.width), cost, self._reach, film.refined)
         film.doublings = self.tally.timed(self.pool, "camera pass", lambda: self.pool.run([made])[0])
 
     def state(self) -> State:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from pmviewer.engine.inspection import Wanted
 from pmviewer.engine.inspector.report import Pinned
-from pmviewer.engine.method import Plan
+from pmviewer.engine.plan import Plan
 from pmviewer.output.diagnostic_views import DENOISED, DIAGNOSTICS
 from pmviewer.settings.access import Settings, get, needs_of
 from pmviewer.settings.needs import Facts, unmet

@@ -14,7 +14,7 @@ from typing import Any
 @dataclass(frozen=True, eq=False)
 class Facts:
     """What needs are judged by: the `settings` (`pmviewer.settings.schema.Settings`), the `plan` that follows from them
-    (`pmviewer.engine.method.Plan`), and the `traits` of the scene (`pmviewer.scene.analysis.SceneTraits`)."""
+    (`pmviewer.engine.plan.Plan`), and the `traits` of the scene (`pmviewer.scene.analysis.SceneTraits`)."""
 
     settings: Any
     plan: Any

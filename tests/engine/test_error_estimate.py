@@ -78,6 +78,22 @@ def test_one_bright_pixel_does_not_hide_in_its_own_brightness(cornell):
     assert error.latest.relmse > 10 * alone
 
 
+def test_a_bright_path_does_not_hide_in_what_a_filter_makes_of_it(cornell):
+    """Its neighbours are as bright by the same path; what is wrong of all nine is relative to what is around them."""
+    film = noted(32, 32)
+    error = ErrorEstimate(32, 32, Settings(), plan_of(Settings(), cornell.traits), reach=1)
+    spread = np.outer([0.25, 0.5, 0.25], [0.25, 0.5, 0.25])
+    for i in range(2):
+        film.sums[:, 0:3] += 1.0
+        if i:
+            film.sums.reshape(32, 32, -1)[8:11, 11:14, 0:3] += 100.0 * spread[..., None]
+        add(film)
+        error.add(film)
+    wrong = 50.0 * spread  # of the mean of both
+    assert error.latest is not None
+    assert error.latest.relmse > 8 * (wrong**2 / (1.0 + wrong) ** 2).sum() / 1024
+
+
 def test_passes_that_share_one_photon_map_tell_nothing(cornell):
     once = with_values(Settings(), {"photons.renew": "once"})
     assert not ErrorEstimate(8, 8, once, plan_of(once, cornell.traits)).tells

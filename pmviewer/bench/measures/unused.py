@@ -19,8 +19,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pmviewer.bench.report import BenchResult, Cell, Target
-from pmviewer.engine.method import EDGE_RAYS, MIRROR_RAYS, Plan
+from pmviewer.engine.method import EDGE_RAYS, MIRROR_RAYS
 from pmviewer.engine.opened import OpenScene, open_scene
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.prepare import prepare
 from pmviewer.engine.renderer import Renderer

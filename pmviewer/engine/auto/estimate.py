@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from pmviewer.engine.auto.bias import Bias
 from pmviewer.engine.auto.relative import part_means
-from pmviewer.engine.method import Plan
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.remaining import Remaining
 from pmviewer.output.metric import EPSILON
 from pmviewer.render.film import Film
@@ -44,7 +44,6 @@ UNSURE = 0.35
 """Relative error of an estimate by one value of D beside that; it falls with the root of their number."""
 AROUND = (3, 7)
 """Pixels along the sides of the boxes whose means, the lesser of both, stand for what a noisy pixel ought to show."""
-NEIGHBOURS = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], bool)
 BLOCKS = 8
 """Blocks along each side of the picture whose differences tell how well D is known."""
 BAND = 16
@@ -67,10 +66,12 @@ class _Level:
 
 class ErrorEstimate:
     """Follows one film from pass to pass. `tells` is False where all passes share what is wrong with them; `bias`, if
-    anybody sets it, gives the squared relative bias after so many passes."""
+    anybody sets it, gives the squared relative bias after so many passes. reach: how many pixels away the film's filter
+    still finds a pixel's samples."""
 
-    def __init__(self, width: int, height: int, settings: Settings, plan: Plan) -> None:
+    def __init__(self, width: int, height: int, settings: Settings, plan: Plan, reach: int = 0) -> None:
         self._size = width, height
+        self._apart = 2 * reach + 1
         self.tells = plan.moments and settings.photons.renew == "each pass"
         self.bias: Bias | None = None
         shrinks = plan.shown_directly | plan.caustic_mask | plan.volume and settings.estimate.alpha < 1.0
@@ -93,7 +94,7 @@ class ErrorEstimate:
         tasks: list[Callable[[], Any]] = [partial(np.copyto, total[part], image[part]) for part in rows]
         half = self._sums.pop(n // 2, None) if n % 2 == 0 else None
         if half is not None:
-            tasks += [partial(_of_band, half, image, n // 2, part.start) for part in rows]
+            tasks += [partial(_of_band, half, image, n // 2, part.start, self._apart) for part in rows]
         made = run(tasks)
         if half is not None:
             level = _level(np.concatenate(made[len(rows) :]), n // 2)
@@ -140,28 +141,31 @@ def _is_level(n: int) -> bool:
     return n & (n - 1) == 0 or (n % 3 == 0 and (n // 3) & (n // 3 - 1) == 0)
 
 
-def _of_band(first: F8, total: F8, m: int, begin: int) -> F8:
+def _of_band(first: F8, total: F8, m: int, begin: int, apart: int) -> F8:
     """Relative squared differences, in BAND rows, of m passes, whose sum is `first`, against the m passes after them;
-    `total` is the sum of both. The mean over channels."""
-    end, reach = min(begin + BAND, len(total)), max(AROUND) // 2
+    `total` is the sum of both. Pixels so far `apart` share no samples. The mean over channels."""
+    end, reach = min(begin + BAND, len(total)), max(max(AROUND) // 2, apart)
     top, bottom = max(begin - reach, 0), min(end + reach, len(total))
     asked = slice(begin - top, end - top)
     plane = np.zeros((end - begin, total.shape[1]))
     for c in range(3):
         mean = total[top:bottom, :, c] / (2 * m)
         square = (2 * first[top:bottom, :, c] - total[top:bottom, :, c]) ** 2 / (2 * m * m)
-        plane += (square / (_seen(mean, square / 2) ** 2 + EPSILON))[asked] / 3
+        plane += (square / (_seen(mean, square / 2, apart) ** 2 + EPSILON))[asked] / 3
     return plane
 
 
-def _seen(mean: F8, variance: F8) -> F8:
+def _seen(mean: F8, variance: F8, apart: int) -> F8:
     """What the pixels (h, w) of that mean and about that variance show: what those around them do, and what they differ
-    by from these as far as it stands out of the noise there (Wiener). A pixel that is brighter than all of its
-    neighbours counts as the brightest of them: what one path made would hide in its own brightness."""
+    by from these as far as it stands out of the noise there (Wiener). A pixel that is brighter than all those so far
+    `apart`, which share no samples with it, counts as the brightest of them: what one path made would hide in its own
+    brightness."""
     from scipy.ndimage import maximum_filter, uniform_filter  # late: processes that only compile start without
 
     around = np.minimum(*(uniform_filter(mean, size) for size in AROUND))
-    own = np.minimum(mean, maximum_filter(mean, footprint=NEIGHBOURS, mode="mirror")) - around
+    ring = np.ones((2 * apart + 1, 2 * apart + 1), bool)
+    ring[1:-1, 1:-1] = False
+    own = np.minimum(mean, maximum_filter(mean, footprint=ring, mode="mirror")) - around
     certain = own**2 / np.maximum(own**2 + uniform_filter(variance, AROUND[0]), EPSILON**2)
     return np.asarray(around + certain * own)
 

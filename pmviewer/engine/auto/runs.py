@@ -14,8 +14,9 @@ from pmviewer.engine.auto.relative import F8
 from pmviewer.engine.auto.size import FEWEST_PHOTONS, OF_DEAREST, PROBED, Size, fitted
 from pmviewer.engine.auto.sparse import wider_by, with_wider
 from pmviewer.engine.auto.widths import WIDER
-from pmviewer.engine.method import Plan, plan_of
+from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.radius import FirstRadii
 from pmviewer.engine.renderer import Renderer

@@ -13,8 +13,8 @@ from pmviewer.engine.inspector.life import life_of
 from pmviewer.engine.inspector.lit import lit_places
 from pmviewer.engine.inspector.look_ups import Replay, look_ups_of
 from pmviewer.engine.inspector.report import Float, LitPlace, LookUp, PhotonAt, PhotonLife, Pinned, PixelReport, Seen
-from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.stages.eye import gather_rays_of
 from pmviewer.engine.wanted import looked_map

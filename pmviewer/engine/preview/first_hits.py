@@ -7,7 +7,7 @@ from dataclasses import fields
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.method import Plan
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.stages.eye import render_into
 from pmviewer.engine.stages.pass_data import pass_record

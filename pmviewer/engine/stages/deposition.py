@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.method import Plan
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.stages.importance import ImportanceMaps, ImportanceStage
 from pmviewer.importance.importons import Rule as ImportonRule
 from pmviewer.importance.importons import trace

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pmviewer.engine.method import Plan
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.stages.deposition import Rules, importance_of, sampled_classes
 from pmviewer.engine.stages.importance import ImportanceStage
 from pmviewer.engine.stages.tracer import Tracer

@@ -9,8 +9,8 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.stages.pass_data import RenderedPass
 from pmviewer.engine.stages.virtual_lights import lights_asked

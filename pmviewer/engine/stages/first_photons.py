@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.stages.projection import projection_for
 from pmviewer.engine.stages.tracer import Tracer
 from pmviewer.engine.store import StageStore

@@ -11,8 +11,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.radius import FREE_PATHS, rounded
 from pmviewer.engine.stages.first_photons import TRACED, key_of, traced
 from pmviewer.engine.store import StageStore

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.method import Plan
+from pmviewer.engine.plan import Plan
 from pmviewer.maps.radius import neighbourhood
 from pmviewer.maps.search.grid import PhotonGrid, build_grid
 from pmviewer.render.gather.corner import CORNERS, NO_CORNERS

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from pmviewer.engine.focus import focused
 from pmviewer.engine.frame import PhotonCloud
 from pmviewer.engine.immersion import immersed
-from pmviewer.engine.method import Plan, plan_of
+from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.stages.thin_glass import thin_key
 from pmviewer.engine.store import StageStore

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.pool import WorkPool
 from pmviewer.engine.radius import volume_neighbours, widest_in_media
 from pmviewer.engine.stages.gather_guides import GUIDING_PHOTONS, guide_grid, guide_radius

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from pmviewer.engine.method import Plan
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.radius import FirstRadii, free_paths, pass_neighbours, pass_radius, volume_radius
 from pmviewer.engine.stages.deposition import Rules, rules_of
 from pmviewer.engine.stages.importance import ImportanceStage

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pmviewer.engine.look_up_plan import estimator_of
-from pmviewer.engine.method import Plan
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.radius import volume_neighbours
 from pmviewer.engine.stages.estimation import Estimates, blank_estimates
 from pmviewer.engine.stages.gather_guides import gather_records

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pmviewer.engine.method import Plan
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.stages.deposition import Rules
 from pmviewer.maps.radiance import RadianceMap
 from pmviewer.maps.search.grid import RECORD as GRID_RECORD

@@ -14,8 +14,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.pool import Begun, WorkPool
 from pmviewer.engine.radius import FirstRadii
 from pmviewer.engine.stages.estimation import estimate_gathers

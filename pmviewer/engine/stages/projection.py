@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from pmviewer.engine.method import Plan, plan_of
+from pmviewer.engine.method import plan_of
 from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.plan import Plan
 from pmviewer.photons.light_pass.plan import trajectories
 from pmviewer.photons.projection.aim import MOST_LIGHTS
 from pmviewer.photons.projection.projection import Projection, projection_of

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.radius import FirstRadii, first_radius, rounded, seen_from
 from pmviewer.engine.stages.first_photons import TRACED, traced
 from pmviewer.engine.stages.free_paths import free_paths

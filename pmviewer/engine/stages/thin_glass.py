@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pmviewer.engine.method import Plan
 from pmviewer.engine.opened import OpenScene
+from pmviewer.engine.plan import Plan
 from pmviewer.kernels.scene import thin_dtype
 from pmviewer.scene.arrays.material_row import THIN_RULES
 from pmviewer.settings.access import Settings

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pmviewer.engine.method import Plan
+from pmviewer.engine.plan import Plan
 from pmviewer.engine.stages.thin_glass import thin_key
 from pmviewer.photons.deposition.fates import Fates
 from pmviewer.photons.deposition.rules import Deposition
