@@ -115,7 +115,8 @@ class Film:
     def one_addition(self, first: int, last: int) -> Iterator[None]:
         """While it lasts the sums of pixels first … last−1 are what has been added to them meanwhile, and no more."""
         sums = self.sums[first:last]
-        before = None if self.latest_alone else Increment(sums.copy())
+        nothing = self.latest_alone or (self.passes == 0 and self.numbered is None)
+        before = None if nothing else Increment(sums.copy())
         sums[:] = self.blank
         yield
         if before is not None:
