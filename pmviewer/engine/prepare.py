@@ -126,7 +126,7 @@ def _light_steps(scene: OpenScene, settings: Settings, plan: Plan) -> list[Step]
     light_pass, codes = np.zeros(1, LIGHT_PASS_DTYPE), np.zeros(1, np.uint32)
     in_media = photons if plan.media else None
     out = PhotonBuffers(photons, photons, codes, codes, np.zeros(N_COUNTS, np.int64), empty_ledger(), in_media)
-    maps = projection_for(scene, settings)
+    maps = projection_for(scene, settings, plan)
     emissions = [("light pass", NO_PROJECTION if maps is None else maps.records)]
     if plan.emission != "off":
         emissions = [

@@ -113,10 +113,10 @@ class Film:
 
     @contextmanager
     def one_addition(self, first: int, last: int) -> Iterator[None]:
-        """While it lasts the sums of pixels first … last−1 are what has been added to them meanwhile, and no more."""
+        """While it lasts the sums of pixels first … last−1 are what has been added to them meanwhile, and no more. In a
+        film's first pass they are blank before."""
         sums = self.sums[first:last]
-        nothing = self.latest_alone or (self.passes == 0 and self.numbered is None)
-        before = None if nothing else Increment(sums.copy())
+        before = None if self.latest_alone or self.passes == 0 else Increment(sums.copy())
         sums[:] = self.blank
         yield
         if before is not None:

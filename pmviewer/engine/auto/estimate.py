@@ -50,6 +50,8 @@ BAND = 16
 """Rows of the picture a task."""
 TRUE_BIAS = 1 / 3, 2.0
 """The least and the most of the squared bias that a trial tells which it may be."""
+LEAST = 1e-30
+"""Variance of a pixel, at least: where nothing varies nothing is divided by 0."""
 WIDTH = 1.645
 """Standard errors of an interval that is to cover 90 %."""
 F8 = NDArray[np.float64]
@@ -166,8 +168,8 @@ def _seen(mean: F8, variance: F8, apart: int) -> F8:
     ring = np.ones((2 * apart + 1, 2 * apart + 1), bool)
     ring[1:-1, 1:-1] = False
     own = np.minimum(mean, maximum_filter(mean, footprint=ring, mode="mirror")) - around
-    certain = own**2 / np.maximum(own**2 + uniform_filter(variance, AROUND[0]), EPSILON**2)
-    return np.asarray(around + certain * own)
+    signal, noise = own**2, np.maximum(uniform_filter(variance, AROUND[0]), LEAST)
+    return np.asarray(around + signal / (signal + noise) * own)
 
 
 def _level(plane: F8, m: int) -> _Level:
