@@ -49,7 +49,7 @@ def test_clicks_are_those_that_run_something_else(at_the_start):
     assert {"render.method = gather", "render.method = path", "estimate.lookup = nearest"} <= found.keys()
     assert found["estimate.lookup = nearest"] == with_values(Settings(), {"estimate.lookup": "nearest"})
     assert not [text for text in found if text.startswith(("free_camera.", "display.tone", "render.passes"))]
-    assert [text for text in found if text.startswith("camera.")] == ["camera.aperture = 1000000000000000.0"], "a lens"
+    assert [text for text in found if text.startswith("camera.")] == ["camera.aperture: most"], "a lens"
     assert "render.filter = tent" in found
 
 

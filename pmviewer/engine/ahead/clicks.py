@@ -155,7 +155,7 @@ def _changed(opened: OpenScene, settings: Settings, order: Iterable[SettingInfo]
             continue
         for value in _others(info, get(settings, info.path)):
             try:
-                yield Click(f"{info.path} = {_word(value)}", opened, with_values(settings, {info.path: value}))
+                yield Click(_text(info, value), opened, with_values(settings, {info.path: value}))
             except PmviewerError:
                 continue
 
@@ -175,5 +175,8 @@ def _others(info: SettingInfo, value: Any) -> list[Any]:
     return [*values, *(["auto"] if info.auto else [])]
 
 
-def _word(value: Any) -> str:
-    return ("on" if value else "off") if isinstance(value, bool) else str(value)
+def _text(info: SettingInfo, value: Any) -> str:
+    """Which setting, and what it becomes: of a number which end of its range."""
+    if info.kind in (int, float) and value in (info.lower, info.upper):
+        return f"{info.path}: {'least' if value == info.lower else 'most'}"
+    return f"{info.path} = {('on' if value else 'off') if isinstance(value, bool) else value}"

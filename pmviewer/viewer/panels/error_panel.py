@@ -27,6 +27,8 @@ if TYPE_CHECKING:  # brings OpenEXR along, which the window doesn't wait for
 CURRENT, EARLIER, KEPT = "current", "earlier", "snapshot"
 AXES = {"seconds": "rendering time (s)", "CPU": "CPU time (s)", "passes": "passes"}
 """What curves are plotted against."""
+LEGEND = 0.4
+"""Of a plot's width, what the names of its curves take at most beside it."""
 NARROW, LOW = 26.0, 8.0
 """Ems of a plot below which it has no legend beside it, or no titles of axes: its curves would have no room left."""
 _SNAPSHOTS: tuple[theme.Colour, ...] = (
@@ -166,7 +168,8 @@ class ErrorPanel:
                 spec = implot.Spec(line_color=colour, line_weight=2.0 if current else 1.5)
                 spec.marker, spec.marker_size = implot.Marker_.circle, 3.0 if current else 2.0
                 spec.marker_fill_color = spec.marker_line_color = colour
-                implot.plot_line(theme.drawable(curve.label), xs, ys, spec)
+                label = theme.drawable(curve.label)
+                implot.plot_line(label if narrow else _elided(label, LEGEND * size.x), xs, ys, spec)
             implot.end_plot()
         implot.pop_style_color(3)
         implot.pop_style_var(2)
@@ -192,6 +195,16 @@ class Curve:
 
 def _curve_of(run: Run, current: bool) -> Curve:
     return Curve(f"{run.label}##{run.version}", curve_of(run), CURRENT if current else EARLIER)
+
+
+def _elided(label: str, room: float) -> str:
+    """The label, what it shows before its "##" cut to so many pixels."""
+    shown, mark, own = label.partition("##")
+    if imgui.calc_text_size(shown).x > room:
+        while shown and imgui.calc_text_size(f"{shown}…").x > room:
+            shown = shown[:-1]
+        shown = f"{shown.rstrip(' ,')}…"
+    return f"{shown}{mark}{own}"
 
 
 def _axis(axis: int, title: str, limits: tuple[float, float]) -> None:
