@@ -45,7 +45,7 @@ def arrive(scene, glossy, d, hit, beta):
     beta = attenuation(scene, material, hit.ng, d, hit.t, beta)
     b = bsdf_at(scene, hit.prim, material, hit.u, hit.v, hit.p, hit.ng, hit.ns, wo, glossy, hit.wave)
     wave, beta = met_by(scene, b, hit.wave, beta)
-    return SurfaceInteraction(hit.p, face(hit.ng, wo), hit.gap, b, wo, _media(scene, d, hit), wave), beta
+    return SurfaceInteraction(hit.prim, hit.p, face(hit.ng, wo), hit.gap, b, wo, _media(scene, d, hit), wave), beta
 
 
 @specialised

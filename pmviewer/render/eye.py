@@ -152,7 +152,7 @@ def _from_maps(given, si, beta, pixel, whole):
     eye = given.eye
     if eye.caustic_mask != 0:
         r = own_radius(pixel.radii, OF_CAUSTIC, eye.caustic_radius)
-        L = reflected(given.caustic_map, eye, r, si, eye.caustic_mask)
+        L = reflected(given.scene, given.caustic_map, eye, r, si, eye.caustic_mask)
         count_found(pixel, OF_CAUSTIC, given.caustic_map, eye, r, si, eye.caustic_mask)
         deposit(pixel, CAUSTIC if whole else SPECULAR, mul(beta, L))
     for k in range(3):  # a loop, so that the look-up is compiled once
@@ -163,7 +163,7 @@ def _from_maps(given, si, beta, pixel, whole):
             mask, term = eye.global_caustics, CAUSTIC
         if mask != 0:
             r = own_radius(pixel.radii, OF_GLOBAL, eye.global_radius)
-            L = reflected(given.global_map, eye, r, si, mask)
+            L = reflected(given.scene, given.global_map, eye, r, si, mask)
             count_found(pixel, OF_GLOBAL, given.global_map, eye, r, si, mask)
             deposit(pixel, term if whole else SPECULAR, mul(beta, L))
 

@@ -39,11 +39,12 @@ class PassData(NamedTuple):
 
 
 class SurfaceInteraction(NamedTuple):
-    """A surface point seen from wo: p; ng, the geometric normal on the side of wo; gap, how far rays start off the
-    surface; bsdf, of `pmviewer.kernels.bsdf.scattering`; wo, unit; media, those on the side of wo and behind the
-    surface (`pmviewer.kernels.media.medium`), None in scenes without; wave, that of the path that arrived
-    (`pmviewer.kernels.bsdf.dispersion`), None in scenes without dispersion."""
+    """A surface point seen from wo: prim, the primitive; p; ng, the geometric normal on the side of wo; gap, how far
+    rays start off the surface; bsdf, of `pmviewer.kernels.bsdf.scattering`; wo, unit; media, those on the side of wo
+    and behind the surface (`pmviewer.kernels.media.medium`), None in scenes without; wave, that of the path that
+    arrived (`pmviewer.kernels.bsdf.dispersion`), None in scenes without dispersion."""
 
+    prim: Any
     p: Any
     ng: Any
     gap: Any

@@ -12,6 +12,7 @@ import numpy as np
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import absent, has, part, specialised
 from pmviewer.kernels.memory import stack_i4
+from pmviewer.kernels.vector import largest, scale
 from pmviewer.maps.estimate.combined import combined
 from pmviewer.maps.estimate.differential import checked_irradiance, reach
 from pmviewer.maps.estimate.estimate import irradiance_knn, irradiance_radius
@@ -30,6 +31,7 @@ from pmviewer.maps.radiance import (
 from pmviewer.maps.search.disc import Place
 from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.maps.variant import ABSENT, is_kdtree, is_parts
+from pmviewer.render.covered import ENOUGH_GATHERED, ENOUGH_KEPT, Spot, over_covered
 
 _f4 = np.float32
 _i8 = np.int64
@@ -43,8 +45,9 @@ def _in_parts(photons, eye, radius, p, n, class_mask):
 
 
 @specialised
-def irradiance(photons, eye, radius, p, n, class_mask):
-    """Irradiance (red, green, blue) at the point p with normal n from photons of the classes in `class_mask`.
+def estimate(photons, eye, radius, p, n, class_mask):
+    """Irradiance (red, green, blue) at the point p with normal n from photons of the classes in `class_mask`, and the
+    radius of the disc whose area their power was divided by, 0 where it is no disc's.
 
     `photons` is the record of a grid, a kd-tree or several trees, `eye` an EYE_DTYPE record, `radius` the radius of the
     pass or the maximum radius of the search for neighbours.
@@ -52,45 +55,55 @@ def irradiance(photons, eye, radius, p, n, class_mask):
     if has(photons, "hull"):
 
         def by_hull(photons, eye, radius, p, n, class_mask):
-            return hull_irradiance(photons, eye, radius, p, n, class_mask)
+            return hull_irradiance(photons, eye, radius, p, n, class_mask), _f4(0.0)
 
         return by_hull
 
     if has(photons, "differential"):
 
         def checked(photons, eye, radius, p, n, class_mask):
-            return checked_irradiance(photons, eye, radius, p, n, class_mask)
+            return checked_irradiance(photons, eye, radius, p, n, class_mask), _f4(0.0)
 
         return checked
 
     if is_parts(photons):
 
         def of_parts(photons, eye, radius, p, n, class_mask):
-            E, _, _ = _in_parts(photons, eye, radius, p, n, class_mask)
-            return E
+            E, _, r = _in_parts(photons, eye, radius, p, n, class_mask)
+            return E, r
 
         return of_parts
 
     if is_kdtree(photons):
 
         def nearest(photons, eye, radius, p, n, class_mask):
-            r, g, b, _, _ = irradiance_knn(
+            red, green, blue, _, r = irradiance_knn(
                 photons,
                 Place(p, n, eye.flatness, class_mask),
                 Neighbours(eye.k, radius, eye.rim, eye.share),
                 Filter(eye.filter, eye.cone_k),
             )
-            return r, g, b
+            return (red, green, blue), r
 
         return nearest
 
     def within(photons, eye, radius, p, n, class_mask):
-        r, g, b, _ = irradiance_radius(
+        red, green, blue, _ = irradiance_radius(
             photons, Place(p, n, eye.flatness, class_mask), radius, Filter(eye.filter, eye.cone_k)
         )
-        return r, g, b
+        return (red, green, blue), min(radius, photons.radius)
 
     return within
+
+
+@device
+def irradiance(scene, photons, eye, radius, at, class_mask, enough):
+    """Irradiance (red, green, blue) at a Spot, of the part of the disc that surfaces cover; `enough` as for
+    `over_covered`, the rest as for `estimate`."""
+    E, r = estimate(photons, eye, radius, at.p, at.n, class_mask)
+    if largest(E) > _f4(0.0):  # most look-ups for caustics find nothing
+        return scale(E, over_covered(scene, eye, at, r, enough))
+    return E
 
 
 @specialised
@@ -160,31 +173,38 @@ NO_RADIANCE_PHOTONS = ABSENT
 
 
 @specialised
-def gathered_irradiance(given, p, n):
-    """Irradiance from photons of all classes where a gather ray ends, at p with normal n.
+def gathered_irradiance(given, at):
+    """Irradiance from photons of all classes where a gather ray ends, at a Spot.
 
     Where the pass has radiance photons, that of the nearest one, made by the first ray that needs it, and where none is
     near a look-up of its own; without them always that.
     """
     if absent(part(given, "radiance")):
 
-        def plain(given, p, n):
-            return irradiance(given.global_map, given.eye, given.eye.global_radius, p, n, np.int32(ALL_CLASSES))
+        def plain(given, at):
+            return _of_all(given, at, _i8(ENOUGH_GATHERED))
 
         return plain
 
-    def through_radiance_photons(given, p, n):
+    def through_radiance_photons(given, at):
         radiance, eye = given.radiance, given.eye
-        index = nearest_radiance_photon(radiance, p, n, eye.radiance_cutoff, eye.flatness, eye.radiance_similarity)
-        if index >= 0:
-            word = radiance_photon_slot(radiance, index)
-            if word != UNKNOWN:
-                return radiance_photon_irradiance(radiance, word)
-            p, n = radiance_photon_place(radiance, index)
-        E = irradiance(given.global_map, eye, eye.global_radius, p, n, np.int32(ALL_CLASSES))
+        index = nearest_radiance_photon(
+            radiance, at.p, at.n, eye.radiance_cutoff, eye.flatness, eye.radiance_similarity
+        )
         if index < 0:
-            return E
+            return _of_all(given, at, _i8(ENOUGH_GATHERED))
+        word = radiance_photon_slot(radiance, index)
+        if word != UNKNOWN:
+            return radiance_photon_irradiance(radiance, word)
+        p, n = radiance_photon_place(radiance, index)
+        E = _of_all(given, Spot(_i8(-1), p, n), _i8(ENOUGH_KEPT))
         # What was stored, not E: it must not matter who comes first.
         return radiance_photon_irradiance(radiance, store_irradiance(radiance, index, E))
 
     return through_radiance_photons
+
+
+@device
+def _of_all(given, at, enough):
+    eye = given.eye
+    return irradiance(given.scene, given.global_map, eye, eye.global_radius, at, np.int32(ALL_CLASSES), enough)

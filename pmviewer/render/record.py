@@ -61,6 +61,7 @@ _FIELDS: list[tuple] = [
     ("share", "f4"),  # of their disc's area, in which they count
     ("cone_k", "f4"),
     ("flatness", "f4"),
+    ("covered", "i4"),  # whether estimates are for the part of their disc that surfaces cover
     ("boundary", "f4"),  # what photons on a convex hull's boundary count
     ("caustic_radius", "f4"),
     ("global_radius", "f4"),
@@ -178,6 +179,7 @@ def eye_record(
     estimate = settings.estimate
     r["filter"], r["rim"] = FILTERS.index(estimate.filter), RIMS.index(estimate.rim)
     r["cone_k"], r["flatness"], r["boundary"] = estimate.cone_k, estimate.flatness, estimate.boundary
+    r["covered"] = estimate.area == "covered" and not estimate.differential
     r["roulette"] = settings.gather.roulette
     r["radiance_similarity"] = settings.gather.similarity
     for field in fields(evaluation):

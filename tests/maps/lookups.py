@@ -8,7 +8,7 @@ from pmviewer.kernels.compile.jit import kernel
 from pmviewer.maps.estimate.filters import FILTERS
 from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.maps.variant import looked_up_by
-from pmviewer.render.lookup import irradiance
+from pmviewer.render.lookup import estimate as estimated
 from pmviewer.render.record import EYE_DTYPE
 
 UP = np.array([0, 0, 1], np.float32)
@@ -16,12 +16,12 @@ UP = np.array([0, 0, 1], np.float32)
 
 @kernel
 def look_up(maps, eyes, radius, points, normals, classes, E):
-    """The eye pass's irradiance at points (m, 3) with normals (m, 3) into E (m, 3)."""
+    """The eye pass's estimates at points (m, 3) with normals (m, 3) into E (m, 3)."""
     photons, eye = maps[0], eyes[0]
     for i in range(len(points)):
         p = (points[i, 0], points[i, 1], points[i, 2])
         n = (normals[i, 0], normals[i, 1], normals[i, 2])
-        E[i, 0], E[i, 1], E[i, 2] = irradiance(photons, eye, radius, p, n, classes)
+        (E[i, 0], E[i, 1], E[i, 2]), _ = estimated(photons, eye, radius, p, n, classes)
 
 
 def estimate(

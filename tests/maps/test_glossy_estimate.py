@@ -49,7 +49,7 @@ def _knn(records, eyes, p, n, ns, radius, out):
         b = PlainBsdf(STORED, ALBEDO, 0, facing, facing)
         normal = (n[i, 0], n[i, 1], n[i, 2])
         point = (p[i, 0], p[i, 1], p[i, 2])
-        out[i] = radiance_knn(records[0], eyes[0], radius, point, normal, i4(ALL_CLASSES), b, STORED, ANY, normal)
+        out[i], _ = radiance_knn(records[0], eyes[0], radius, point, normal, i4(ALL_CLASSES), b, STORED, ANY, normal)
 
 
 def _by_knn(records, p, n, ns, k, radius, flatness, kind, rim, out):

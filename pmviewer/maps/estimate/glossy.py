@@ -109,7 +109,7 @@ def scattered_power(tree, place, n, b, group, flags, wo):
 
 @device
 def radiance_knn(tree, eye, max_radius, p, n, class_mask, b, group, flags, wo):
-    """The same from the `eye.k` nearest photons, whatever their flags."""
+    """The same from the `eye.k` nearest photons, whatever their flags, and the radius of their disc."""
     filter_kind, cone_k, rim = eye.filter, eye.cone_k, eye.rim
     keys = stack_i4(KEYS)
     neighbours = Neighbours(eye.k, max_radius, rim, eye.share)
@@ -129,4 +129,4 @@ def radiance_knn(tree, eye, max_radius, p, n, class_mask, b, group, flags, wo):
         green += _f8(w * g)
         blue += _f8(w * bl)
     scale = _f8(tree.power_unit) / (_f8(filter_disc_mean(filter_kind, cone_k)) * _PI * _f8(r2))
-    return _f4(red * scale), _f4(green * scale), _f4(blue * scale)
+    return (_f4(red * scale), _f4(green * scale), _f4(blue * scale)), np.sqrt(r2)

@@ -23,5 +23,5 @@ def is_apart(m, d, n):
     what counts wrongly makes up for what the disc lacks at the foot of that: without it more is wrong than with it.)
     """
     least = _f4(SURELY) * dot(m, m)
-    cosine, along = min(dot(m, n), _f4(0.0)), min(dot(m, d), _f4(0.0))
-    return cosine * cosine > least or (dot(d, n) < _f4(0.0) and along * along > least * dot(d, d))
+    cosine, along = dot(m, n), min(dot(m, d), _f4(0.0))
+    return cosine * abs(cosine) < least or (dot(d, n) < _f4(0.0) and along * along > least * dot(d, d))

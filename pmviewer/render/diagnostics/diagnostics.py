@@ -22,6 +22,7 @@ from pmviewer.maps.radiance import nearest_radiance_photon, radiance_photon_plac
 from pmviewer.maps.search.stored import ALL_CLASSES
 from pmviewer.render.cast import Hit, cast
 from pmviewer.render.chain import BLACK, WHITE, arrive, follow
+from pmviewer.render.covered import ENOUGH_KEPT, Spot
 from pmviewer.render.direct.choice import LIST_WORDS, chosen_light
 from pmviewer.render.direct.choose import choose
 from pmviewer.render.direct.shadow import UNKNOWN, known_visibility
@@ -131,7 +132,8 @@ def radiance_view(scenes, eyes, maps, radiance_maps, cell_maps, out, first, last
             if cell >= 0:
                 q, _ = radiance_photon_place(cells, cell)
                 out[pixel, 3] = cell_number(q) + _f4(BEYOND)
-        E = irradiance(photons, eye, eye.global_radius, p, ng, _i4(ALL_CLASSES))
+        at = Spot(_i8(hit.prim) if index < 0 else _i8(-1), p, ng)
+        E = irradiance(scene, photons, eye, eye.global_radius, at, _i4(ALL_CLASSES), _i8(ENOUGH_KEPT))
         out[pixel, 0], out[pixel, 1], out[pixel, 2] = E
 
 

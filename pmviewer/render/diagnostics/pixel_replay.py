@@ -98,7 +98,7 @@ def _stored(given, radii, pixel, si, beta, numbers, rows, row):
     depth, surface = numbers
     if eye.caustic_mask != 0:
         r = own_radius(radii_of(radii, pixel), OF_CAUSTIC, eye.caustic_radius)
-        L = reflected(given.caustic_map, eye, r, si, eye.caustic_mask)
+        L = reflected(given.scene, given.caustic_map, eye, r, si, eye.caustic_mask)
         row = _put(rows, row, si, beta, L, r, (_i8(OF_CAUSTICS), _i8(eye.caustic_mask), depth, _i8(0), surface))
     for k in range(4):
         mask, r = eye.global_mask, own_radius(radii_of(radii, pixel), OF_GLOBAL, eye.global_radius)
@@ -111,7 +111,7 @@ def _stored(given, radii, pixel, si, beta, numbers, rows, row):
             if eye.gather_rays > 0:
                 mask = _i4(ALL_CLASSES)
         if mask != 0:
-            L = reflected(given.global_map, eye, r, si, mask)
+            L = reflected(given.scene, given.global_map, eye, r, si, mask)
             purpose = _i8(AS_INDIRECT + k) if k < 3 else _i8(GATHERED)
             row = _put(rows, row, si, beta, L, r, (purpose, _i8(mask), depth, _i8(0), surface))
     return row

@@ -63,7 +63,7 @@ def _again(given, si, seed, index, counts, hit):
     choice = choose(scene, eye, given.choice_map, si, stack_i4(LIST_WORDS))
     L = direct_light(scene, given.shadows, si, STORED, choice, _i8(eye.mis), sampler, counts)
     if eye.caustic_mask != 0:
-        L = add(L, reflected(given.caustic_map, eye, eye.caustic_radius, si, eye.caustic_mask))
+        L = add(L, reflected(scene, given.caustic_map, eye, eye.caustic_radius, si, eye.caustic_mask))
     u, v, u_lobe, _ = draw4(eye.sequence, sampler.seed, index, SECOND_RAY)
     d, weight, pdf, _ = bsdf_sample(scene, si.bsdf, STORED, si.wo, u_lobe, u, v)
     if dot(d, si.ng) <= _f4(0.0) or not largest(weight) > _f4(0.0):

@@ -292,10 +292,11 @@ class Estimate(Group):
         ge=0.01,
         le=1.0,
     )
-    area: Literal["disc", "convex hull"] = setting(
-        "disc",
-        "Area that the photons' power is divided by. disc: of the look-up disc, too large over the edge of a surface, "
-        "which comes out dark. convex hull: what the photons span, right at edges and in corners.",
+    area: Literal["covered", "disc", "convex hull"] = setting(
+        "covered",
+        "Area that the photons' power is divided by. covered: as much of the look-up disc as surfaces cover, right at "
+        "edges and in corners. disc: all of it, too large over the edge of a surface, which comes out dark. convex "
+        "hull: what the photons span.",
         stage="image",
         scale="choice",
     )
