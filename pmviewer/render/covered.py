@@ -13,29 +13,31 @@ place (`pmviewer.maps.search.sides`) and stores photons.
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from pmviewer.kernels.accel.opacity import lets_pass, over_opacity
-from pmviewer.kernels.accel.raycast import closest_hit
 from pmviewer.kernels.bsdf.scattering import STORED, bsdf_at, keeps
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import specialised
+from pmviewer.kernels.media.medium import has_media
 from pmviewer.kernels.memory import bits_of_float
 from pmviewer.kernels.random import hash3, unit_float
 from pmviewer.kernels.scene import load3, material_of
-from pmviewer.kernels.surface import face, surface_at
+from pmviewer.kernels.surface import face
 from pmviewer.kernels.vector import along, basis, dot, scale, sub
 from pmviewer.maps.estimate.filters import CONSTANT, filter_weight
 from pmviewer.maps.photon_words import decode_normal, encode_arrival
 from pmviewer.maps.search.in_disc import FLAT
 from pmviewer.maps.search.sides import is_apart
+from pmviewer.render.cast import Ray, cast
 
-ENOUGH, ENOUGH_GATHERED, ENOUGH_KEPT, MOST = 3, 1, 12, 16
+ENOUGH, ENOUGH_GATHERED, ENOUGH_KEPT = 3, 1, 12
 """Covered points that are waited for where a map is shown, where a gather ray ends, one of many, and where many rays
-get the same; points that are tried at most."""
+get the same."""
+TRIED, TRIED_MORE = 8, 8
+"""Points that are tried at most: so many for each of these, and so many more."""
 
 _LEAST_COSINE = 0.1
 """Bound on what a surface that leans away is larger than seen from above."""
@@ -43,8 +45,7 @@ _LEAST_COSINE = 0.1
 _f4 = np.float32
 _i8 = np.int64
 _u4 = np.uint32
-_STEPS = (_f4(0.7548776662466927), _f4(0.5698402909980532), _f4(0.6180339887498949))
-"""Of additive sequences that fill a square (Roberts 2018) and an interval evenly."""
+_UNIT = _f4(2.0**-15)
 
 
 class Spot(NamedTuple):
@@ -93,6 +94,14 @@ def _is_plain_triangle(scene, prim):
     return lambda scene, prim: prim >= 0 and prim < scene.n_triangles
 
 
+@specialised
+def _any_medium(scene):
+    """For a ray of which nobody asks what it went through."""
+    if has_media(scene):
+        return lambda scene: _i8(-1)
+    return lambda scene: None
+
+
 @device
 def _surface(scene, eye, at, x, y, radius):
     """How much surface there is above or below a point of the disc of that radius: area seen from above counts 1, what
@@ -100,25 +109,21 @@ def _surface(scene, eye, at, x, y, radius):
     n, height = at.n, eye.flatness * radius
     s, t = basis(n)
     o = along(along(along(at.p, s, x * radius), t, y * radius), n, height)
-    d = scale(n, _f4(-1.0))
-    far = _f4(2.0) * height
-    below, found, u, v = closest_hit(scene, o[0], o[1], o[2], d[0], d[1], d[2], _f4(0.0), far)
-    prim = _i8(found)
-    if prim < 0:
+    hit = cast(scene, Ray(o, scale(n, _f4(-1.0)), _f4(0.0), _f4(2.0) * height, _any_medium(scene), None))
+    if hit.prim < 0:
         return _f4(0.0)
-    p, outwards, ns, _ = surface_at(scene, prim, u, v, o[0], o[1], o[2], d[0], d[1], d[2], below)
-    m, above = face(outwards, n), height - below
+    m, above = face(hit.ng, n), height - hit.t
     if (x * x + y * y) * radius * radius + above * above >= radius * radius:
         return _f4(0.0)
-    if abs(above) > _f4(FLAT) * height and is_apart(decode_normal(encode_arrival(m, m)), sub(p, at.p), n):
+    if abs(above) > _f4(FLAT) * height and is_apart(decode_normal(encode_arrival(m, m)), sub(hit.p, at.p), n):
         return _f4(0.0)
-    material = material_of(scene, prim)
+    material = material_of(scene, hit.prim)
     if at.prim < 0 or material != material_of(scene, at.prim):
-        b = bsdf_at(scene, prim, material, u, v, p, outwards, ns, n, eye.glossy, None)
-        if keeps(scene, material, b, outwards, n, eye.glossy) & STORED == 0:
+        b = bsdf_at(scene, hit.prim, material, hit.u, hit.v, hit.p, hit.ng, hit.ns, n, eye.glossy, None)
+        if keeps(scene, material, b, hit.ng, n, eye.glossy) & STORED == 0:
             return _f4(0.0)
     area = _f4(1.0) / max(dot(m, n), _f4(_LEAST_COSINE))
-    return over_opacity(scene, prim, u, v, p, (area, area, area))[0]
+    return over_opacity(scene, hit.prim, hit.u, hit.v, hit.p, (area, area, area))[0]
 
 
 @device
@@ -139,22 +144,21 @@ def over_covered(scene, eye, at, radius, enough):
         r2 = radius * radius
         if _clears(a, b, r2) and _clears(b, c, r2) and _clears(c, a, r2):
             return _f4(1.0)
-    key = hash3(bits_of_float(at.p[0]), bits_of_float(at.p[1]), _u4(bits_of_float(at.p[2]) ^ _u4(eye.index)))
-    u, v = unit_float(key), unit_float(hash3(key, _u4(eye.index), _u4(1)))
-    w, tried, met, area = u, _f4(0.0), _i8(0), _f4(0.0)
-    for _ in range(8 * MOST):
-        if met == enough or tried == _f4(MOST):
-            break
-        u, v = u + _STEPS[0], v + _STEPS[1]
-        u, v = u - _f4(math.floor(u)), v - _f4(math.floor(v))
-        x, y = _f4(2.0) * u - _f4(1.0), _f4(2.0) * v - _f4(1.0)
+    key = hash3(bits_of_float(at.p[0]), bits_of_float(at.p[1]), bits_of_float(at.p[2]))
+    tried, met, area = _f4(0.0), _i8(0), _f4(0.0)
+    most = _f4(TRIED) * _f4(enough) + _f4(TRIED_MORE)
+    k = _u4(0)
+    while met < enough and tried < most:
+        k += _u4(1)
+        # Points of a sequence that fills the disc evenly would be met too soon: in the mean after half a period.
+        u = hash3(key, eye.index, k)
+        x, y = _f4(_u4(u & _u4(0xFFFF))) * _UNIT - _f4(1.0), _f4(_u4(u >> _u4(16))) * _UNIT - _f4(1.0)
         x2 = x * x + y * y
         if x2 >= _f4(1.0):
             continue
         if eye.filter != CONSTANT:
-            w += _STEPS[2]
-            w -= _f4(math.floor(w))
-            if w * filter_weight(eye.filter, eye.cone_k, _f4(0.0)) > filter_weight(eye.filter, eye.cone_k, x2):
+            w = filter_weight(eye.filter, eye.cone_k, x2)
+            if unit_float(hash3(u, eye.index, k)) * filter_weight(eye.filter, eye.cone_k, _f4(0.0)) >= w:
                 continue
         tried += _f4(1.0)
         found = _f4(1.0)

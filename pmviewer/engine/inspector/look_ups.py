@@ -64,10 +64,11 @@ Shares = Callable[[int, int, NDArray[np.float32]], NDArray[np.float32]]
 
 
 class Replay:
-    """A pixel of a pass, replayed: `rows` are its look-ups (`pmviewer.render.diagnostics.pixel_replay.ROW`), `way`
-    (v, 3) the camera ray's origin and the points met, `prims` (v − 1,) the primitives there, `samples` (n_lights,) the
-    light samples that are expected on each light where light is sampled, None where it is nowhere; `lights` are the
-    virtual lights that face its surfaces (`pmviewer.render.diagnostics.pixel_replay.LIT`)."""
+    """A pixel of a pass, replayed: `rows` (n,) are its look-ups (`pmviewer.render.diagnostics.pixel_replay.ROW`),
+    `covered` (n,) what surfaces cover of their discs, `way` (v, 3) the camera ray's origin and the points met, `prims`
+    (v − 1,) the primitives there, `samples` (n_lights,) the light samples that are expected on each light where light
+    is sampled, None where it is nowhere; `lights` are the virtual lights that face its surfaces
+    (`pmviewer.render.diagnostics.pixel_replay.LIT`)."""
 
     def __init__(self, rendered: RenderedPass, radii: NDArray[np.float32] | None, pixel: int, n_lights: int) -> None:
         self._arguments = own_eye(rendered.given), radii
@@ -75,13 +76,24 @@ class Replay:
         self._expected = np.zeros(n_lights, np.float32)
         self._lights = empty_lights(min(MOST_SURFACES * lights_asked(rendered.given.virtual), MOST_LIT))
         self.samples: NDArray[np.float32] | None = None
+        whole = self._of_whole_discs()
         self.rows, self.way, self.prims, _, lit = self._run(-1, 0, np.zeros((0, 3), np.float32))
+        self.covered = _ratio(whole, self.rows)
         self.lights = as_lit(self._lights[:lit])
         self._lights = empty_lights(0)  # they are asked once
 
     def shares(self, surface: int, group: int, wi: NDArray[np.float32]) -> NDArray[np.float32]:
         """(m, 3), 1/sr: what the lobes of that group reflect at that surface of light from wi (m, 3)."""
         return self._run(surface, group, wi)[3]
+
+    def _of_whole_discs(self) -> np.ndarray:
+        """The rows as they were if surfaces covered the discs of all look-ups."""
+        eye = self._arguments[0].eye
+        asked = eye["covered"].copy()
+        eye["covered"] = 0
+        rows = self._run(-1, 0, np.zeros((0, 3), np.float32))[0]
+        eye["covered"] = asked
+        return rows
 
     def _run(
         self, surface: int, group: int, wi: NDArray[np.float32]
@@ -96,12 +108,23 @@ class Replay:
         return made, way[: counts[1]].astype(np.float64), prims[1 : counts[1]].copy(), shares, int(counts[3])
 
 
+def _ratio(rows: np.ndarray, others: np.ndarray) -> Float:
+    """Of the radiances of look-ups, 1 where there are none."""
+    L, of = (row["L"].astype(np.float64).sum(axis=1) for row in (rows, others))
+    return np.divide(L, of, out=np.ones(len(L)), where=of > 0)
+
+
 def look_ups_of(replay: Replay, rendered: RenderedPass, settings: Settings, banded: bool) -> tuple[LookUp, ...]:
     """Everything that the pixel looked up, in the order of the eye pass. `banded`: photons tell their wavelengths."""
-    return tuple(_look_up(row, replay, rendered, settings, banded) for row in replay.rows)
+    return tuple(
+        _look_up(row, float(covered), replay, rendered, settings, banded)
+        for row, covered in zip(replay.rows, replay.covered, strict=True)
+    )
 
 
-def _look_up(row: np.void, replay: Replay, rendered: RenderedPass, settings: Settings, banded: bool) -> LookUp:
+def _look_up(
+    row: np.void, covered: float, replay: Replay, rendered: RenderedPass, settings: Settings, banded: bool
+) -> LookUp:
     eye, maps, purpose = rendered.given.eye[0], rendered.maps, int(row["purpose"])
     name = "caustic" if purpose in (OF_CAUSTICS, NOT_FOUND) else "global"
     stored, unit = _stored(maps, name)
@@ -117,7 +140,7 @@ def _look_up(row: np.void, replay: Replay, rendered: RenderedPass, settings: Set
     brings = beta * share * unpacked["Phi"]
     kernel, cone_k = FILTERS[int(eye["filter"])], float(eye["cone_k"])
     weight = chosen.factor * WEIGHTS[kernel](chosen.x2, cone_k)
-    adds = weight[:, None] * brings[chosen.places] / (disc_mean(kernel, cone_k) * math.pi * chosen.radius**2)
+    adds = weight[:, None] * brings[chosen.places] / (disc_mean(kernel, cone_k) * math.pi * chosen.radius**2 * covered)
     return LookUp(
         map=name,
         shows=_SHOWS[purpose] if int(row["depth"]) == 0 else "specular",
@@ -128,6 +151,7 @@ def _look_up(row: np.void, replay: Replay, rendered: RenderedPass, settings: Set
         n=row["n"].astype(np.float64),
         wo=row["wo"].astype(np.float64),
         radius=chosen.radius,
+        covered=covered,
         flatness=disc.flatness,
         k=_asked(maps, name, eye),
         kernel=kernel,

@@ -63,8 +63,8 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """Luminance of a look-up's estimate against its radius, `L` by the name of the kernel; `radii` and each of `L` are
-    (n,), `count` (n,) are the photons within."""
+    """Luminance of a look-up's estimate for the whole disc against its radius, `L` by the name of the kernel; `radii`
+    and each of `L` are (n,), `count` (n,) are the photons within."""
 
     radii: Float
     count: NDArray[np.int64]
@@ -75,7 +75,8 @@ class Curves:
 class LookUp:
     """One look-up of the pixel in a pass: in which `map`, for which term (`shows`), where, how far.
 
-    `radius` is that of its disc (of the k nearest: where it ended), `k` how many were asked for, 0 with a fixed radius;
+    `radius` is that of its disc (of the k nearest: where it ended), `covered` the share of it that the estimate takes
+    to be covered by surfaces, 1 where it is for all of it; `k` how many were asked for, 0 with a fixed radius;
     `value` (3,) the radiance that the eye pass took from it for the pixel. `exact` is whether the photons' `adds` make
     up `value`: estimates of another area (convex hull, differential checking) share the photons and not the sum. What
     is not `used` shows what the map holds there; the pixel gathers instead.
@@ -90,6 +91,7 @@ class LookUp:
     n: Float
     wo: Float
     radius: float
+    covered: float
     flatness: float
     k: int
     kernel: str

@@ -184,6 +184,7 @@ def look_up_rows(look_up: LookUp) -> list[tuple[str, str]]:
     asked = f", the {grouped(look_up.k)} nearest" if look_up.k else ""
     rows = [
         ("Radius", si(look_up.radius, "m")),
+        *([("Covered", f"{look_up.covered:.0%} of the disc")] if look_up.covered != 1.0 else []),
         ("Photons", f"{grouped(look_up.found.n)}{asked}"),
         ("Kernel", look_up.kernel),
         ("Estimate" if look_up.used else "Estimate here", si(value, RADIANCE)),
