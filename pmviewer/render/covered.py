@@ -3,9 +3,10 @@
 A part of a look-up's disc lies beyond the edge of the surface, in a wall, or on what stores no photons. None are found
 there, and the photons' power over the area of the disc is too little: edges of surfaces, corners of rooms, and small
 things come out dark, in a rim as wide as the radius. Power over the area that is covered is right as far as the light
-is even. The factor is the reciprocal of the share that is covered, found by points of the disc: how many it takes until
-some of them are covered, over that number, has that reciprocal as its mean. Points on the triangle that the look-up is
-made on cost nothing, others a short ray through the disc.
+is even. The factor is the
+reciprocal of the share that is covered. Where the triangle that the look-up is made on covers most of it, its edges
+tell how much, and short rays through the disc look for surfaces beyond them. Elsewhere points of the disc are drawn
+until some of them are covered: how many it takes, over that number, has the reciprocal as its mean.
 
 A place counts where the photons of a look-up would: within the disc and its thickness, on a surface that faces like the
 place (`pmviewer.maps.search.sides`) and stores photons.
@@ -13,6 +14,7 @@ place (`pmviewer.maps.search.sides`) and stores photons.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,6 +41,10 @@ get the same."""
 TRIED, TRIED_MORE = 8, 8
 """Points that are tried at most: so many for each of these, and so many more."""
 
+MOSTLY, LITTLE = 0.4, 0.1
+"""Of a disc, what the look-up's own triangle has to cover, or the mean would be a few percent off; and what one ray is
+enough for."""
+
 _LEAST_COSINE = 0.1
 """Bound on what a surface that leans away is larger than seen from above."""
 
@@ -46,6 +52,7 @@ _f4 = np.float32
 _i8 = np.int64
 _u4 = np.uint32
 _UNIT = _f4(2.0**-15)
+_GOLDEN = _f4(0.6180339887498949)
 
 
 class Spot(NamedTuple):
@@ -57,11 +64,14 @@ class Spot(NamedTuple):
     n: Any
 
 
-@device
-def _corner(scene, prim, k, p, s, t):
-    """A corner of a triangle in the plane's coordinates around p."""
-    q = sub(load3(scene.vertices, _i8(prim) * 9 + 3 * k), p)
-    return dot(q, s), dot(q, t)
+class _Triangle(NamedTuple):
+    """Corners of the triangle that a look-up is made on, in its plane's coordinates around the point, relative to the
+    radius; `known`: whether it is one, whose corners the scene has as they are, and that stops all rays."""
+
+    known: Any
+    a: Any
+    b: Any
+    c: Any
 
 
 @device
@@ -71,24 +81,25 @@ def _turn(a, b, x, y):
 
 
 @device
-def _clears(a, b, r2):
-    """Whether the line through a and b is at least √r2 away from the origin."""
+def _clears(a, b):
+    """Whether the line through a and b is at least 1 away from the origin."""
     turn = _turn(a, b, _f4(0.0), _f4(0.0))
     x, y = b[0] - a[0], b[1] - a[1]
-    return turn * turn >= r2 * (x * x + y * y)
+    return turn * turn >= x * x + y * y
 
 
 @device
-def _within(a, b, c, x, y):
+def _holds(triangle, x, y):
     """Whether the triangle holds (x, y)."""
-    first, second, third = _turn(a, b, x, y), _turn(b, c, x, y), _turn(c, a, x, y)
+    first, second = _turn(triangle.a, triangle.b, x, y), _turn(triangle.b, triangle.c, x, y)
+    third = _turn(triangle.c, triangle.a, x, y)
     low, high = min(first, min(second, third)), max(first, max(second, third))
-    return low >= _f4(0.0) or high <= _f4(0.0)
+    return triangle.known and (low >= _f4(0.0) or high <= _f4(0.0))
 
 
 @specialised
 def _is_plain_triangle(scene, prim):
-    """Whether the primitive is a triangle whose corners the scene has as they are, and that stops all rays."""
+    """Whether the primitive is a triangle as `_Triangle` says."""
     if lets_pass(scene):
         return lambda scene, prim: False
     return lambda scene, prim: prim >= 0 and prim < scene.n_triangles
@@ -127,44 +138,132 @@ def _surface(scene, eye, at, x, y, radius):
 
 
 @device
-def over_covered(scene, eye, at, radius, enough):
-    """What a density estimate over the disc of that radius around a Spot is multiplied by for what surfaces leave of
-    the disc uncovered. 1 where `eye.covered` is 0, or the radius. `enough`: covered points that are waited for."""
-    if eye.covered == 0 or not radius > _f4(0.0):
-        return _f4(1.0)
+def _triangle_of(scene, at, radius):
+    corner = (_f4(0.0), _f4(0.0))
+    known = _is_plain_triangle(scene, at.prim)
+    if not known:
+        return _Triangle(known, corner, corner, corner)
     s, t = basis(at.n)
-    plain = _is_plain_triangle(scene, at.prim)
-    a = b = c = (_f4(0.0), _f4(0.0))
-    if plain:
-        a, b, c = (
-            _corner(scene, at.prim, 0, at.p, s, t),
-            _corner(scene, at.prim, 1, at.p, s, t),
-            _corner(scene, at.prim, 2, at.p, s, t),
-        )
-        r2 = radius * radius
-        if _clears(a, b, r2) and _clears(b, c, r2) and _clears(c, a, r2):
-            return _f4(1.0)
-    key = hash3(bits_of_float(at.p[0]), bits_of_float(at.p[1]), bits_of_float(at.p[2]))
+    one = _f4(1.0) / radius
+    first = _i8(at.prim) * 9
+    a, b = sub(load3(scene.vertices, first), at.p), sub(load3(scene.vertices, first + 3), at.p)
+    c = sub(load3(scene.vertices, first + 6), at.p)
+    return _Triangle(
+        known,
+        (one * dot(a, s), one * dot(a, t)),
+        (one * dot(b, s), one * dot(b, t)),
+        (one * dot(c, s), one * dot(c, t)),
+    )
+
+
+@device
+def _weight(eye, x, y):
+    """Of a point of the unit disc by the filter of look-ups, 0 outside."""
+    x2 = x * x + y * y
+    if x2 >= _f4(1.0):
+        return _f4(0.0)
+    return filter_weight(eye.filter, eye.cone_k, x2)
+
+
+@device
+def _beyond_edge(scene, eye, at, radius, a, b, turn, u):
+    """How much of the unit disc around the origin, in units of its area, lies beyond the edge from a to b of a triangle
+    that holds the origin, as seen from there, and how much surface there is, told by one or two rays. turn: 1 of a
+    triangle that is seen anticlockwise, −1 of others; u: a number in [0, 1)."""
+    x, y = b[0] - a[0], b[1] - a[1]
+    length = _f4(math.sqrt(x * x + y * y))
+    if not length > _f4(0.0):
+        return _f4(0.0), _f4(0.0)
+    x, y = x / length, y / length
+    outx, outy = turn * y, -turn * x
+    d = max(a[0] * outx + a[1] * outy, _f4(0.0))
+    if d >= _f4(1.0):
+        return _f4(0.0), _f4(0.0)
+    start = a[0] * x + a[1] * y
+    half = _f4(math.sqrt(_f4(1.0) - d * d))
+    first, last = max(start, -half), min(start + length, half)
+    if first >= last:
+        return _f4(0.0), _f4(0.0)
+    low, high = _f4(math.atan2(first, d)), _f4(math.atan2(last, d))
+    beyond = (high - low - d * (last - first)) * _f4(0.5 / math.pi)
+    rays = 1 if beyond < _f4(LITTLE) else 2
+    met, tried = _f4(0.0), _f4(0.0)
+    for k in range(rays):
+        angle = low + (high - low) * (u + _f4(k)) / _f4(rays)
+        cos, sin = _f4(math.cos(angle)), _f4(math.sin(angle))
+        edge = d / cos
+        width = _f4(1.0) - edge * edge  # of area per angle
+        u += _GOLDEN
+        u -= _f4(math.floor(u))
+        r = _f4(math.sqrt(edge * edge + max(width, _f4(0.0)) * u))
+        found = _surface(scene, eye, at, r * (cos * outx + sin * x), r * (cos * outy + sin * y), radius)
+        tried += width
+        met += width * found
+    if not tried > _f4(0.0):
+        return beyond, beyond
+    return beyond, beyond * met / tried
+
+
+@device
+def _share_by_edges(scene, eye, at, radius, triangle, u):
+    """The share of the disc that is covered, where the triangle covers most of it; 0 where it covers little."""
+    a, b, c = triangle.a, triangle.b, triangle.c
+    inside, share = _f4(1.0), _f4(1.0)
+    turn = _f4(math.copysign(_f4(1.0), _turn(a, b, c[0], c[1])))
+    for k in range(3):  # a loop, so that it is compiled once
+        first, last = a, b
+        if k == 1:
+            first, last = b, c
+        elif k == 2:
+            first, last = c, a
+        beyond, met = _beyond_edge(scene, eye, at, radius, first, last, turn, u)
+        inside -= beyond
+        share += met - beyond
+        if inside < _f4(MOSTLY):
+            return _f4(0.0)
+    return share
+
+
+@device
+def _factor_by_waiting(scene, eye, at, radius, triangle, key, enough):
+    """How many points it takes until some of them are covered, over their number."""
     tried, met, area = _f4(0.0), _i8(0), _f4(0.0)
     most = _f4(TRIED) * _f4(enough) + _f4(TRIED_MORE)
     k = _u4(0)
     while met < enough and tried < most:
         k += _u4(1)
-        # Points of a sequence that fills the disc evenly would be met too soon: in the mean after half a period.
+        # Points that fill the disc evenly would be met too soon: after half of their distance in the mean.
         u = hash3(key, eye.index, k)
         x, y = _f4(_u4(u & _u4(0xFFFF))) * _UNIT - _f4(1.0), _f4(_u4(u >> _u4(16))) * _UNIT - _f4(1.0)
-        x2 = x * x + y * y
-        if x2 >= _f4(1.0):
-            continue
-        if eye.filter != CONSTANT:
-            w = filter_weight(eye.filter, eye.cone_k, x2)
-            if unit_float(hash3(u, eye.index, k)) * filter_weight(eye.filter, eye.cone_k, _f4(0.0)) >= w:
+        w = _weight(eye, x, y)
+        if eye.filter == CONSTANT:
+            if w == _f4(0.0):
                 continue
+        elif unit_float(hash3(u, eye.index, k)) * filter_weight(eye.filter, eye.cone_k, _f4(0.0)) >= w:
+            continue
         tried += _f4(1.0)
         found = _f4(1.0)
-        if not (plain and _within(a, b, c, x * radius, y * radius)):
+        if not _holds(triangle, x, y):
             found = _surface(scene, eye, at, x, y, radius)
         if found > _f4(0.0):
             met += 1
             area += found
     return tried / max(area, _f4(1.0))
+
+
+@device
+def over_covered(scene, eye, at, radius, enough):
+    """What a density estimate over the disc of that radius around a Spot is multiplied by for what surfaces leave of
+    the disc uncovered. 1 where `eye.covered` is 0, or the radius. `enough`: covered points that are waited for."""
+    if eye.covered == 0 or not radius > _f4(0.0):
+        return _f4(1.0)
+    triangle = _triangle_of(scene, at, radius)
+    a, b, c = triangle.a, triangle.b, triangle.c
+    if triangle.known and _clears(a, b) and _clears(b, c) and _clears(c, a):
+        return _f4(1.0)
+    key = hash3(bits_of_float(at.p[0]), bits_of_float(at.p[1]), _u4(bits_of_float(at.p[2]) ^ eye.index))
+    if triangle.known and eye.filter == CONSTANT:
+        share = _share_by_edges(scene, eye, at, radius, triangle, unit_float(key))
+        if share > _f4(0.0):
+            return _f4(1.0) / share
+    return _factor_by_waiting(scene, eye, at, radius, triangle, key, enough)
