@@ -41,7 +41,7 @@ get the same."""
 TRIED, TRIED_MORE = 8, 8
 """Points that are tried at most: so many for each of these, and so many more."""
 
-MOSTLY, LITTLE = 0.4, 0.1
+MOSTLY, LITTLE, NONE = 0.4, 0.3, 0.02
 """Of a disc, what the look-up's own triangle has to cover, or the mean would be a few percent off; and what one ray is
 enough for."""
 
@@ -186,6 +186,8 @@ def _beyond_edge(scene, eye, at, radius, a, b, turn, u):
         return _f4(0.0), _f4(0.0)
     low, high = _f4(math.atan2(first, d)), _f4(math.atan2(last, d))
     beyond = (high - low - d * (last - first)) * _f4(0.5 / math.pi)
+    if beyond < _f4(NONE):
+        return _f4(0.0), _f4(0.0)
     rays = 1 if beyond < _f4(LITTLE) else 2
     met, tried = _f4(0.0), _f4(0.0)
     for k in range(rays):

@@ -29,7 +29,7 @@ ORDERS = OUTLINES[0], OPEN[0]
 """The least and the greatest p that a trial believes in."""
 SPREAD = 0.2
 """Standard deviation of p over bundled scenes, around `ORDER`: in seven of eight it is within that."""
-HIDDEN = 1e-3
+HIDDEN = 3e-4
 """Squared relative bias of a shown global map that a noisy trial may well overlook: with the automatic radius it was
 3e-4 to 1e-2 in six of seven scenes where a trial saw any."""
 UNSEEN = 0.8

@@ -8,19 +8,19 @@ from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.vector import dot
 
 SURELY = 0.25
-"""Square of the sine of 30°: with more of a cosine, squared, a cell of normals is on one side of a plane whole."""
+"""Square of the cosine of 60° and of the sine of 30°: cells of normals reach 30° away from their middles."""
 
 _f4 = np.float32
 
 
 @device
 def is_apart(m, d, n):
-    """Whether a surface that is d away from a place with unit normal n is surely not the same side of the same one,
-    wherever in the cell with the middle m its normal is.
+    """Whether a surface that is d away from a place with unit normal n is not the same side of the same one, the normal
+    there being in the cell with the middle m.
 
-    Its normal points away from n, as on the inside of a bent sheet. Or it lies below the plane of the place and has the
-    place before it, as the inside of a box has: what is convex has it behind. (The other way round, behind a wall,
-    what counts wrongly makes up for what the disc lacks at the foot of that: without it more is wrong than with it.)
+    The middle leans away from n by more than 60°, as a wall from its floor and the inside of a bent sheet from its
+    outside. Or the surface lies below the plane of the place and surely has the place before it, as the inside of a box
+    has: what is convex has it behind. (The same above the plane is what lies in a hollow.)
     """
     least = _f4(SURELY) * dot(m, m)
     cosine, along = dot(m, n), min(dot(m, d), _f4(0.0))

@@ -22,7 +22,7 @@ LOOKED_UP_BY_K = Need(
     "Look-ups of a fixed radius find the same photons in several maps as in one (estimate.lookup).",
 )
 PLAIN_DISC = Need(
-    lambda f: f.settings.estimate.area == "disc" and not f.settings.estimate.differential,
+    lambda f: f.settings.estimate.area != "convex hull" and not f.settings.estimate.differential,
     "Hulls and differential checking go through the photons of one map.",
 )
 ALL_STORED = Need(
