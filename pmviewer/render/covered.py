@@ -27,7 +27,7 @@ from pmviewer.kernels.media.medium import has_media
 from pmviewer.kernels.memory import bits_of_float
 from pmviewer.kernels.random import hash3, unit_float
 from pmviewer.kernels.scene import load3, material_of
-from pmviewer.kernels.surface import face
+from pmviewer.kernels.surface import face, leave
 from pmviewer.kernels.vector import along, basis, dot, scale, sub
 from pmviewer.maps.estimate.filters import CONSTANT, filter_weight
 from pmviewer.maps.photon_words import decode_normal, encode_arrival
@@ -41,10 +41,12 @@ get the same."""
 TRIED, TRIED_MORE = 8, 8
 """Points that are tried at most: so many for each of these, and so many more."""
 
-MOSTLY, LITTLE, NONE = 0.4, 0.3, 0.02
-"""Of a disc, what the look-up's own triangle has to cover, or the mean would be a few percent off; and what one ray is
-enough for."""
+MOSTLY, LITTLE, NONE = 0.4, 0.1, 0.02
+"""Of a disc, what the look-up's own triangle has to cover, or the mean would be a few percent off; what one ray is
+enough for; and what none is needed for, being taken to be covered."""
 
+LAYERS = 4
+"""Surfaces that are counted at most, one above the other."""
 _LEAST_COSINE = 0.1
 """Bound on what a surface that leans away is larger than seen from above."""
 
@@ -114,19 +116,10 @@ def _any_medium(scene):
 
 
 @device
-def _surface(scene, eye, at, x, y, radius):
-    """How much surface there is above or below a point of the disc of that radius: area seen from above counts 1, what
-    leans away more. (x, y): the point, relative to the radius."""
-    n, height = at.n, eye.flatness * radius
-    s, t = basis(n)
-    o = along(along(along(at.p, s, x * radius), t, y * radius), n, height)
-    hit = cast(scene, Ray(o, scale(n, _f4(-1.0)), _f4(0.0), _f4(2.0) * height, _any_medium(scene), None))
-    if hit.prim < 0:
-        return _f4(0.0)
-    m, above = face(hit.ng, n), height - hit.t
-    if (x * x + y * y) * radius * radius + above * above >= radius * radius:
-        return _f4(0.0)
-    if abs(above) > _f4(FLAT) * height and is_apart(decode_normal(encode_arrival(m, m)), sub(hit.p, at.p), n):
+def _area(scene, eye, at, hit, off):
+    """How much surface there is for each of the disc where a ray from above met some; `off`: off the plane."""
+    n, m = at.n, face(hit.ng, at.n)
+    if off and is_apart(decode_normal(encode_arrival(m, m)), sub(hit.p, at.p), n):
         return _f4(0.0)
     material = material_of(scene, hit.prim)
     if at.prim < 0 or material != material_of(scene, at.prim):
@@ -135,6 +128,28 @@ def _surface(scene, eye, at, x, y, radius):
             return _f4(0.0)
     area = _f4(1.0) / max(dot(m, n), _f4(_LEAST_COSINE))
     return over_opacity(scene, hit.prim, hit.u, hit.v, hit.p, (area, area, area))[0]
+
+
+@device
+def _surface(scene, eye, at, x, y, radius):
+    """How much surface there is above or below a point of the disc of that radius: area seen from above counts 1, what
+    leans away more. (x, y): the point, relative to the radius."""
+    n, height = at.n, eye.flatness * radius
+    s, t = basis(n)
+    reach2 = (_f4(1.0) - x * x - y * y) * radius * radius
+    o = along(along(along(at.p, s, x * radius), t, y * radius), n, height)
+    down, top, total = scale(n, _f4(-1.0)), height, _f4(0.0)
+    for _ in range(LAYERS):
+        hit = cast(scene, Ray(o, down, _f4(0.0), top + height, _any_medium(scene), None))
+        if hit.prim < 0:
+            break
+        top -= hit.t
+        if top * top < reach2:
+            total += _area(scene, eye, at, hit, abs(top) > _f4(FLAT) * height)
+        if top <= _f4(FLAT) * height:  # below the plane of the look-up there is hardly ever more
+            break
+        o = leave(hit.p, hit.ng, hit.gap, down[0], down[1], down[2])
+    return total
 
 
 @device
@@ -235,13 +250,13 @@ def _factor_by_waiting(scene, eye, at, radius, triangle, key, enough):
     while met < enough and tried < most:
         k += _u4(1)
         # Points that fill the disc evenly would be met too soon: after half of their distance in the mean.
-        u = hash3(key, eye.index, k)
+        u = hash3(key, k, _u4(1))
         x, y = _f4(_u4(u & _u4(0xFFFF))) * _UNIT - _f4(1.0), _f4(_u4(u >> _u4(16))) * _UNIT - _f4(1.0)
         w = _weight(eye, x, y)
         if eye.filter == CONSTANT:
             if w == _f4(0.0):
                 continue
-        elif unit_float(hash3(u, eye.index, k)) * filter_weight(eye.filter, eye.cone_k, _f4(0.0)) >= w:
+        elif unit_float(hash3(u, k, _u4(2))) * filter_weight(eye.filter, eye.cone_k, _f4(0.0)) >= w:
             continue
         tried += _f4(1.0)
         found = _f4(1.0)
@@ -263,7 +278,9 @@ def over_covered(scene, eye, at, radius, enough):
     a, b, c = triangle.a, triangle.b, triangle.c
     if triangle.known and _clears(a, b) and _clears(b, c) and _clears(c, a):
         return _f4(1.0)
-    key = hash3(bits_of_float(at.p[0]), bits_of_float(at.p[1]), _u4(bits_of_float(at.p[2]) ^ eye.index))
+    # What many rays get must not depend on whose sample asks first.
+    index = _u4(eye.index) if at.prim >= 0 else _u4(0)
+    key = hash3(bits_of_float(at.p[0]), bits_of_float(at.p[1]), _u4(bits_of_float(at.p[2]) ^ index))
     if triangle.known and eye.filter == CONSTANT:
         share = _share_by_edges(scene, eye, at, radius, triangle, unit_float(key))
         if share > _f4(0.0):

@@ -49,7 +49,7 @@ def test_the_list_is_the_naive_estimate_of_the_pixel(pool):
     renderer = renderer_of(pool, estimate={"filter": "cone", "cone_k": 1.3})
     renderer.step()
     maps = renderer.latest.maps.photons
-    checked = 0
+    checked, covered = 0, []
     for x, y in DIFFUSE:
         told = report(renderer, x, y)
         planes = renderer.film.planes()[y, x]
@@ -63,20 +63,24 @@ def test_the_list_is_the_naive_estimate_of_the_pixel(pool):
             radius = renderer.tally.radius[look_up.map]
             E, count = naive.irradiance_radius(photons, unit, look_up.p, look_up.n, radius, 0.2, mask, "cone", 1.3)
             albedo = planes[15:18]
-            assert albedo * E / np.pi == pytest.approx(planes[term], rel=1e-4, abs=1e-7)
+            assert albedo * E / np.pi / look_up.covered == pytest.approx(planes[term], rel=1e-4, abs=1e-7)
+            covered.append(look_up.covered)
             assert look_up.value == pytest.approx(planes[term], rel=1e-6)
             assert look_up.sum == pytest.approx(planes[term], rel=1e-4, abs=1e-7)
             assert look_up.found.n == count
             p = unpack(photons, unit)
             d = np.linalg.norm(p["position"].astype(float) - look_up.p, axis=1)
             height = np.abs((p["position"].astype(float) - look_up.p) @ look_up.n)
-            inside = (d < radius) & (height <= 0.2 * radius) & (p["wi"] @ look_up.n > 0)
+            inside = (d < radius) & (height <= 0.2 * radius)
+            inside &= naive.arriving(photons, look_up.p, look_up.n, 0.2 * radius / 2048)
             inside &= (mask >> p["path_class"]) & 1 == 1
             assert sorted(look_up.found.index) == list(np.flatnonzero(inside))
             assert look_up.found.distance == pytest.approx(np.sort(d[inside]), rel=1e-5)
             np.testing.assert_array_equal(look_up.found.records[:, :3], photons[look_up.found.index, :3])
             checked += count
     assert checked > 100
+    assert min(covered) < 0.9
+    assert max(covered) == 1.0
 
 
 def test_the_nearest_photons_of_a_pixel(pool):
@@ -92,7 +96,7 @@ def test_the_nearest_photons_of_a_pixel(pool):
             photons.global_, photons.global_unit, look_up.p, look_up.n, 30, largest, 0.2, 0b0010, "simpson", 0.0, 1
         )
         planes = renderer.film.planes()[y, x]
-        assert planes[15:18] * E / np.pi == pytest.approx(planes[12:15], rel=1e-4)
+        assert planes[15:18] * E / np.pi / look_up.covered == pytest.approx(planes[12:15], rel=1e-4)
         assert (look_up.k, look_up.found.n) == (30, count)
         assert look_up.radius == pytest.approx(radius, rel=1e-5)
         assert look_up.sum == pytest.approx(planes[12:15], rel=1e-4)
@@ -160,7 +164,7 @@ def test_the_curve_of_a_kernel_passes_through_the_estimate(pool):
     (look_up,) = (one for one in report(renderer, *DIFFUSE[0]).look_ups if one.map == "global")
     here = np.searchsorted(look_up.curves.radii, look_up.radius)
     weights = [0.2126, 0.7152, 0.0722]
-    assert look_up.curves.L["gaussian"][here] == pytest.approx(look_up.value @ weights, rel=1e-4)
+    assert look_up.curves.L["gaussian"][here] == pytest.approx(look_up.covered * look_up.value @ weights, rel=1e-4)
     albedo = renderer.film.planes()[DIFFUSE[0][1], DIFFUSE[0][0], 15:18]
     for i in (20, 40, here, 63):
         radius = look_up.curves.radii[i]
@@ -215,7 +219,7 @@ def test_light_samples_are_those_of_the_rule(pool, choice):
         p = unpack(grid.photons, 1.0)
         (look_up,) = (one for one in told.look_ups if one.map == "global")
         near = np.linalg.norm(p["position"] - look_up.p, axis=1) < grid.radius
-        near &= p["wi"] @ look_up.n > 0
+        near &= naive.arriving(grid.photons, look_up.p, look_up.n)
         counts = np.bincount(p["light"][near], minlength=2)
         assert counts.min() > 0
         expected = 0.9 * counts / counts.sum() + 0.1 * expected

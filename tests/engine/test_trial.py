@@ -103,12 +103,16 @@ def test_a_trial_sees_bias_that_is_narrower_than_its_pixels_are_apart(pool):
     assert tried.measured[0].bias.caustic.bias2 == pytest.approx(bias2, rel=0.4)
 
 
+NOTHING = 2e-5
+"""Squared bias that none of the above can tell from none."""
+
+
 def test_a_trial_tells_what_look_ups_at_the_ends_of_gather_rays_lack(pool):
-    """Near edges, beside the path tracer, as eight passes of one radius do: as much, or with the thick discs and second
-    gathers of automatic mode, which leave little of it, a third to the whole. Second gathers farther out are an option
-    then, with less bias and dearer passes."""
+    """Near edges, beside the path tracer, as eight passes of one radius do: next to nothing, as discs count for what is
+    covered of them. Second gathers farther out are an option then, with less bias and dearer passes."""
     scene = open_scene("cornell_diffuse")
-    base = with_values(Settings(), {"camera.width": 64, "camera.height": 64, "photons.N": 50_000})
+    small = {"camera.width": 64, "camera.height": 64, "photons.N": 50_000}
+    base = with_values(Settings(), small)
 
     def mean_of(passes, **values):
         renderer = Renderer(scene, with_values(base, values), pool, StageStore(0))
@@ -117,14 +121,14 @@ def test_a_trial_tells_what_look_ups_at_the_ends_of_gather_rays_lack(pool):
         return beauty_of(renderer.film.planes()).astype(float)
 
     gather = GATHER.having(THICKER | CORNERS)
-    for way, least, most in ((GATHER, 0.6, 1.4), (gather, 0.25, 1.4)):
+    for way, least, most in ((GATHER, 0.25, 1.4), (gather, 0.25, 1.4)):
         tried = trial(scene, base, [way], pool, (64, 64), 0.0, lambda text, share: None)
         paths = [mean_of(64, **{"render.method": "path", "render.seed": seed}) for seed in (5, 6)]
         lacking = [mean_of(8, **way.values, **{"estimate.alpha": 1.0, "render.seed": seed}) for seed in (7, 8)]
         true = squared(lacking, paths, np.mean(paths, axis=0), 4)
         told = tried.measured[0].bias.gathered.bias2
         print(f"{way.values}: {told:.3g} told, {true:.3g} true")
-        assert least * true < told < most * true
+        assert least * true - NOTHING < told < most * true + NOTHING
     usual, farther = tried.measured
     assert farther.candidate.values["gather.secondary"] > gather.values["gather.secondary"]
     assert farther.bias.gathered.bias2 < told

@@ -279,14 +279,14 @@ def test_the_inside_of_a_housing_is_not_seen_on_its_outside(how):
 
 
 def test_the_inside_of_a_box_does_not_count_on_its_top():
-    """Photons on both sides of a thin wall below a place, near the edge of a box's top: those of its outside count as
-    far down as the disc reaches, those of its inside do not."""
+    """Photons on both sides of a thin bevel below a place, near the edge of a box's top: those of its outside count as
+    far down as the disc reaches, those of its inside do not. Nor do those of an upright wall."""
     rng = np.random.default_rng(7)
     n, radius = 200_000, 0.056
     position = np.stack([np.full(n, 0.05), rng.uniform(-1, 1, n), rng.uniform(-0.03, 0.0, n)], axis=1)
     outside = np.arange(n) % 2 == 0
-    normal = np.where(outside, 1, -1)[:, None] * [1.0, 0, 0]
-    photons = naive.pack(position, (normal + [0, 0, 1]) / np.sqrt(2), 1.0, normal=normal)
+    normal = np.where(outside, 1, -1)[:, None] * np.array([0.6, 0, 0.8])
+    photons = naive.pack(position, np.tile([0, 0, 1.0], (n, 1)), 1.0, normal=normal)
     points = np.stack([np.zeros(50), rng.uniform(-0.8, 0.8, 50), np.zeros(50)], axis=1).astype(f4)
     up = np.tile(np.array([0, 0, 1], f4), (50, 1))
     _, counts = by_radius(build_grid(photons, radius), points, up, radius, 0.2)
@@ -294,3 +294,6 @@ def test_the_inside_of_a_box_does_not_count_on_its_top():
     expected = [(low & (np.linalg.norm(position - p, axis=1) < radius)).sum() for p in points]
     assert min(expected) > 100
     np.testing.assert_allclose(counts, expected, atol=3)
+    upright = naive.pack(position, np.tile([0.6, 0, 0.8], (n, 1)), 1.0, normal=np.tile([1.0, 0, 0], (n, 1)))
+    _, counts = by_radius(build_grid(upright, radius), points, up, radius, 0.2)
+    assert counts.max() <= 3  # within rounding of the plane

@@ -77,7 +77,7 @@ def test_light_does_not_leak_into_a_gap_that_is_narrower_than_records_reach():
     )
     assert theirs[gap].mean() < 0.4 * theirs[open_].mean()
     assert ours[gap].mean() < 1.7 * theirs[gap].mean()  # 2.3 times without a look about
-    assert ours[open_].mean() == pytest.approx(theirs[open_].mean(), rel=0.03)
+    assert ours[open_].mean() == pytest.approx(theirs[open_].mean(), rel=0.04)
     assert renderer.frame(1).statistics.interpolated > 0.4
 
 

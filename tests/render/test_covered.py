@@ -30,11 +30,11 @@ def plane(x, y, z=0.0, lean=(1.0, 0.0)):
 
 @kernel
 def factors(scenes, eyes, prim, p, n, radius, enough, out):
-    """`over_covered` of as many passes as `out` has room for."""
+    """`over_covered` of as many passes as `out` has room for, and of places that are hardly apart."""
     scene, eye = scenes[0], eyes[0]
-    at = Spot(prim, (p[0], p[1], p[2]), (n[0], n[1], n[2]))
     for i in range(len(out)):
         eye.index = np.uint32(i)
+        at = Spot(prim, (p[0] + np.float32(1e-6) * np.float32(i), p[1], p[2]), (n[0], n[1], n[2]))
         out[i] = over_covered(scene, eye, at, radius, enough)
 
 
@@ -87,6 +87,7 @@ def test_edges_and_corners_of_a_plate(x, y, enough):
 
 
 def test_nothing_needs_to_be_known_of_the_surface():
+    """The same place has the same factor then, whatever the pass."""
     mean, error = factor([PLATE], 0.85, 0.9, known=False)
     assert mean == pytest.approx(1 / share(0.85, 0.9, on_plate), rel=0.02, abs=4 * error)
 
@@ -112,7 +113,15 @@ NEIGHBOURS = {
 def test_what_photons_would_count_on_is_covered(kind):
     neighbours, area = NEIGHBOURS[kind]
     mean, error = factor([PLATE, *neighbours], 0.9, 0.0)
-    assert mean == pytest.approx(1 / share(0.9, 0.0, area), rel=0.03, abs=4 * error)
+    assert mean == pytest.approx(1 / share(0.9, 0.0, area), rel=0.035, abs=4 * error)
+
+
+def test_sheets_above_one_another_count_each():
+    above = Parallelogram((0.8, -1, 0.05), (2, 0, 0), (0, 2, 0))
+    mean, error = factor([PLATE, above], 0.7, 0.0, known=False, enough=24)
+    assert mean == pytest.approx(
+        1 / share(0.7, 0.0, lambda x, y: on_plate(x, y) + 1.0 * (x > 0.8)), rel=0.03, abs=4 * error
+    )
 
 
 def test_mirrors_store_no_photons():

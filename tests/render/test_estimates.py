@@ -41,9 +41,11 @@ def test_the_hull_regains_the_light_that_discs_lose_in_corners(rendered):
     """Indirect light of the box: discs of 4 cm lose more than 1.5 % over its edges, hulls of their photons nothing
     (over eight seeds they have 1.7 % too much). What is taken for true has 0.7 % of noise."""
     true = rendered(64, 100_000, radius=0.005).mean()
-    disc = rendered(4, 100_000, radius=0.045).mean() / true
+    disc = rendered(4, 100_000, radius=0.045, area="disc").mean() / true
+    covered = rendered(4, 100_000, radius=0.045).mean() / true
     hull = rendered(4, 100_000, radius=0.045, area="convex hull").mean() / true
-    print(f"indirect light by discs {disc:.4f}, by hulls {hull:.4f} of the true")
+    print(f"indirect light by discs {disc:.4f}, what is covered of them {covered:.4f}, hulls {hull:.4f} of the true")
+    assert covered == pytest.approx(1, abs=0.015)
     assert disc < 0.985
     assert hull == pytest.approx(1, abs=0.025)
 
@@ -53,10 +55,12 @@ def test_every_estimate_is_another_picture(rendered, lookup):
     """Compiled code of one estimate is not taken for another. That trees are told apart, too, is shown in
     tests/maps/test_variant.py."""
     base = {"radius": 0.1, "lookup": lookup, "k": 200}
-    disc = rendered(1, 20_000, **base)
+    covered = rendered(1, 20_000, **base)
+    disc = rendered(1, 20_000, **base, area="disc")
     hull = rendered(1, 20_000, **base, area="convex hull")
     checked = rendered(1, 20_000, **base, differential=True)
     assert not np.array_equal(disc, hull)
+    assert not np.array_equal(disc, covered)
     assert not np.array_equal(disc, checked)
     assert not np.array_equal(hull, checked)
     assert disc.mean() < checked.mean() < 1.3 * disc.mean()  # edges lose less

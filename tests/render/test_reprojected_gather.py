@@ -215,11 +215,12 @@ def reprojected(scene, passes=2, threads=1, gather=ON, **groups):
 
 def test_gathers_without_sources_are_those_of_the_estimation_but_for_rounding(monkeypatch):
     scene = cornell_box(size=48)
-    alone = reprojected(scene, 2, gather=ALONE)
+    whole = {"area": "disc"}  # what covers a part of one is told by points that the last bit of a place decides
+    alone = reprojected(scene, 2, gather=ALONE, estimate=whole)
     assert alone.latest.estimates.known is None
-    some = reprojected(scene, 2)
+    some = reprojected(scene, 2, estimate=whole)
     monkeypatch.setattr(reprojection, "FEWEST", 5)
-    full = reprojected(scene, 2)
+    full = reprojected(scene, 2, estimate=whole)
     assert (full.latest.estimates.known.how != PARTIAL).all()
     assert np.allclose(full.frame(0).planes, alone.frame(0).planes, rtol=1e-3, atol=1e-4)  # two kernels, each rounds
     assert full.tally.rays == alone.tally.rays

@@ -56,10 +56,10 @@ def test_every_class_of_paths_is_counted_once(mis, indirect_caustics):
 
 
 def test_corners_are_no_longer_dark():
-    """In a closed box wide look-ups lose light at edges. Short rays that gather again leave pixels at edges as wrong
-    as others, which see the dark edges from afar."""
+    """In a closed box wide look-ups by whole discs lose light at edges. Short rays that gather again leave pixels there
+    as wrong as others, which see the dark edges from afar."""
     scene = open_scene(diffuse_box(size=32))
-    estimate = {"radius": 0.1, "alpha": 1.0}
+    estimate = {"radius": 0.1, "alpha": 1.0, "area": "disc"}
     images = {}
     for secondary in (0.0, 3.0):
         groups = {"render": {"method": "gather"}, "photons": {"N": 60_000}, "estimate": estimate}

@@ -32,8 +32,8 @@ def neighbours(positions: np.ndarray, point: np.ndarray, k: int, max_radius: flo
 
 
 def arriving(photons, point, normal, flat=0.0):
-    """Which photons (n,) come from the front to what may be the same surface: the cells of their normals have middles
-    that are less than 120° away, and those below the plane don't have the place before them by more than 30°. Up to
+    """Which photons (n,) come from the front to the same surface: the cells of their normals have middles that are less
+    than 60° away, and those below the plane don't have the place before them by more than 30°. Up to
     `flat` off the plane all may."""
     words = photons.view(np.uint32)[:, 3]
     u, v = (((words >> shift) & 7).astype(float) / 4 - 0.875 for shift in (20, 8))
@@ -47,7 +47,7 @@ def arriving(photons, point, normal, flat=0.0):
     sine = np.einsum("ij,ij->i", middles, d) / np.maximum(np.linalg.norm(d, axis=1), 1e-300)
     apart = (d @ normal < 0) & (sine < -0.5)
     front, off = unpack(photons, 1.0)["wi"].astype(float) @ normal > 0, np.abs(d @ normal) > flat
-    return front & ~(off & ((middles @ normal < -0.5) | apart))
+    return front & ~(off & ((middles @ normal < 0.5) | apart))
 
 
 def _candidates(photons, power_unit, point, normal, class_mask, flat=0.0):

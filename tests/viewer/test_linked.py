@@ -12,7 +12,7 @@ from pmviewer.viewer.pair import OTHER_CAMERA
 from tests.viewer.driver import app_on_engine, chord, drive, finished, wait_until
 
 SMALL = {"camera.width": 32, "camera.height": 24, "render.passes": 1, "photons.N": 2000}
-THERE = {"camera.origin": (0.3, 0.1, 3.4), "camera.target": (0.0, 0.0, 0.0)}
+THERE = {"camera.origin": (0.6, 0.45, -1.3), "camera.target": (0.5, 0.49, 0.0)}
 
 
 def test_a_snapshot_follows_the_live_camera_with_its_own_settings(tmp_path):

@@ -92,7 +92,7 @@ def _part(photons: NDArray[np.float32], first: int, disc: Disc, radius: np.float
     if not disc.both_sides:
         m, least = decode_normals(word), math.sqrt(SURELY)
         apart = (height < 0) & ((m * offset).sum(axis=1) < -least * np.sqrt(d2))
-        counts &= front & (m @ disc.n >= -least) & ~apart
+        counts &= front & (m @ disc.n >= least) & ~apart
     return Near((first + here[counts]).astype(np.int64), d2[counts], reach[counts], front[counts])
 
 
