@@ -81,7 +81,7 @@ THICKER = {"estimate.flatness": 0.3}
 """Beside a gather, whose rays average what they meet: photons of the next wall or facet make up for what a disc has
 beyond the edge. relMSE after 12 passes over that of thin discs: 0.53 in cornell_fractal, 0.97 in cornell_diffuse and
 corner_room, 0.99 in museum, 1.00 in eight others. Shown directly, they blur what is finer than the radius."""
-CORNERS = {"gather.secondary": 5.0}
+CORNERS = {"gather.secondary": 2.0}
 """Gather rays that end within five radii gather again, so that no disc is dark beyond an edge or takes light from the
 next wall: relMSE of a model of bricks in the same time 0.6 times that without (its picture 1.5 % too dark instead of
 3.2 %), of a coated ball in a mount 0.9, of a wooden staircase 1.05. With the irradiance cache records may cost

@@ -159,7 +159,8 @@ def _picked(found: list[Option], promised: Callable[[Option], float], fewer: flo
     best = min(found, key=of)
     if best.measured.candidate.gathers:
         gathers = [o for o in found if o.measured.candidate.gathers]
-        best = min(gathers, key=lambda o: of(o) * o.measured.candidate.overlooked)
+        sure = min(gathers, key=lambda o: of(o) * o.measured.candidate.overlooked)
+        best = min([sure, *(o for o in found if not o.measured.candidate.gathers)], key=of)
     near = [o for o in found if o.measured is best.measured and of(o) <= NEARLY * of(best)]
     best = min(near, key=_preference)
     usual = next((o for o in found if _is_default(o)), None)
