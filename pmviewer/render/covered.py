@@ -34,6 +34,7 @@ from pmviewer.maps.photon_words import decode_normal, encode_arrival
 from pmviewer.maps.search.in_disc import FLAT
 from pmviewer.maps.search.sides import is_apart
 from pmviewer.render.cast import Ray, cast
+from pmviewer.render.cut import Triangle, clears, cut_by, holds, turn_of
 
 ENOUGH, ENOUGH_GATHERED, ENOUGH_KEPT = 3, 1, 12
 """Covered points that are waited for where a map is shown, where a gather ray ends, one of many, and where many rays
@@ -41,10 +42,9 @@ get the same."""
 TRIED, TRIED_MORE = 8, 8
 """Points that are tried at most: so many for each of these, and so many more."""
 
-MOSTLY, LITTLE, NONE = 0.4, 0.1, 0.02
+MOSTLY, LITTLE = 0.4, 0.1
 """Of a disc, what the look-up's own triangle has to cover, or the mean would be a few percent off; what one ray is
-enough for; and what none is needed for, being taken to be covered."""
-
+enough for."""
 LAYERS = 4
 """Surfaces that are counted at most, one above the other."""
 _LEAST_COSINE = 0.1
@@ -66,42 +66,9 @@ class Spot(NamedTuple):
     n: Any
 
 
-class _Triangle(NamedTuple):
-    """Corners of the triangle that a look-up is made on, in its plane's coordinates around the point, relative to the
-    radius; `known`: whether it is one, whose corners the scene has as they are, and that stops all rays."""
-
-    known: Any
-    a: Any
-    b: Any
-    c: Any
-
-
-@device
-def _turn(a, b, x, y):
-    """Twice the area of the triangle from a to b to (x, y)."""
-    return (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])
-
-
-@device
-def _clears(a, b):
-    """Whether the line through a and b is at least 1 away from the origin."""
-    turn = _turn(a, b, _f4(0.0), _f4(0.0))
-    x, y = b[0] - a[0], b[1] - a[1]
-    return turn * turn >= x * x + y * y
-
-
-@device
-def _holds(triangle, x, y):
-    """Whether the triangle holds (x, y)."""
-    first, second = _turn(triangle.a, triangle.b, x, y), _turn(triangle.b, triangle.c, x, y)
-    third = _turn(triangle.c, triangle.a, x, y)
-    low, high = min(first, min(second, third)), max(first, max(second, third))
-    return triangle.known and (low >= _f4(0.0) or high <= _f4(0.0))
-
-
 @specialised
 def _is_plain_triangle(scene, prim):
-    """Whether the primitive is a triangle as `_Triangle` says."""
+    """Whether the primitive is a triangle as `Triangle` says."""
     if lets_pass(scene):
         return lambda scene, prim: False
     return lambda scene, prim: prim >= 0 and prim < scene.n_triangles
@@ -157,13 +124,12 @@ def _triangle_of(scene, at, radius):
     corner = (_f4(0.0), _f4(0.0))
     known = _is_plain_triangle(scene, at.prim)
     if not known:
-        return _Triangle(known, corner, corner, corner)
+        return Triangle(known, corner, corner, corner)
     s, t = basis(at.n)
-    one = _f4(1.0) / radius
-    first = _i8(at.prim) * 9
+    one, first = _f4(1.0) / radius, _i8(at.prim) * 9
     a, b = sub(load3(scene.vertices, first), at.p), sub(load3(scene.vertices, first + 3), at.p)
     c = sub(load3(scene.vertices, first + 6), at.p)
-    return _Triangle(
+    return Triangle(
         known,
         (one * dot(a, s), one * dot(a, t)),
         (one * dot(b, s), one * dot(b, t)),
@@ -181,63 +147,43 @@ def _weight(eye, x, y):
 
 
 @device
-def _beyond_edge(scene, eye, at, radius, a, b, turn, u):
-    """How much of the unit disc around the origin, in units of its area, lies beyond the edge from a to b of a triangle
-    that holds the origin, as seen from there, and how much surface there is, told by one or two rays. turn: 1 of a
-    triangle that is seen anticlockwise, −1 of others; u: a number in [0, 1)."""
-    x, y = b[0] - a[0], b[1] - a[1]
-    length = _f4(math.sqrt(x * x + y * y))
-    if not length > _f4(0.0):
-        return _f4(0.0), _f4(0.0)
-    x, y = x / length, y / length
-    outx, outy = turn * y, -turn * x
-    d = max(a[0] * outx + a[1] * outy, _f4(0.0))
-    if d >= _f4(1.0):
-        return _f4(0.0), _f4(0.0)
-    start = a[0] * x + a[1] * y
-    half = _f4(math.sqrt(_f4(1.0) - d * d))
-    first, last = max(start, -half), min(start + length, half)
-    if first >= last:
-        return _f4(0.0), _f4(0.0)
-    low, high = _f4(math.atan2(first, d)), _f4(math.atan2(last, d))
-    beyond = (high - low - d * (last - first)) * _f4(0.5 / math.pi)
-    if beyond < _f4(NONE):
-        return _f4(0.0), _f4(0.0)
-    rays = 1 if beyond < _f4(LITTLE) else 2
+def _met_beyond(scene, eye, at, radius, cut, u):
+    """How much surface there is in what is cut off, as a share of the disc, told by one or two rays. u: a number in
+    [0, 1)."""
+    if not cut.share > _f4(0.0):
+        return _f4(0.0)
+    rays = 1 if cut.share < _f4(LITTLE) else 2
     met, tried = _f4(0.0), _f4(0.0)
     for k in range(rays):
-        angle = low + (high - low) * (u + _f4(k)) / _f4(rays)
+        angle = cut.low + (cut.high - cut.low) * (u + _f4(k)) / _f4(rays)
         cos, sin = _f4(math.cos(angle)), _f4(math.sin(angle))
-        edge = d / cos
-        width = _f4(1.0) - edge * edge  # of area per angle
+        edge = cut.d / cos
+        width = max(_f4(1.0) - edge * edge, _f4(0.0))  # of area per angle
         u += _GOLDEN
         u -= _f4(math.floor(u))
-        r = _f4(math.sqrt(edge * edge + max(width, _f4(0.0)) * u))
-        found = _surface(scene, eye, at, r * (cos * outx + sin * x), r * (cos * outy + sin * y), radius)
+        r = _f4(math.sqrt(edge * edge + width * u))
+        x, y = r * (cos * cut.outx + sin * cut.x), r * (cos * cut.outy + sin * cut.y)
         tried += width
-        met += width * found
-    if not tried > _f4(0.0):
-        return beyond, beyond
-    return beyond, beyond * met / tried
+        met += width * _surface(scene, eye, at, x, y, radius)
+    return cut.share * met / tried if tried > _f4(0.0) else cut.share
 
 
 @device
 def _share_by_edges(scene, eye, at, radius, triangle, u):
     """The share of the disc that is covered, where the triangle covers most of it; 0 where it covers little."""
     a, b, c = triangle.a, triangle.b, triangle.c
-    inside, share = _f4(1.0), _f4(1.0)
-    turn = _f4(math.copysign(_f4(1.0), _turn(a, b, c[0], c[1])))
+    turn = _f4(math.copysign(_f4(1.0), turn_of(a, b, c[0], c[1])))
+    first, second, third = cut_by(a, b, turn), cut_by(b, c, turn), cut_by(c, a, turn)
+    share = _f4(1.0) - first.share - second.share - third.share
+    if share < _f4(MOSTLY):
+        return _f4(0.0)
     for k in range(3):  # a loop, so that it is compiled once
-        first, last = a, b
+        cut = first
         if k == 1:
-            first, last = b, c
+            cut = second
         elif k == 2:
-            first, last = c, a
-        beyond, met = _beyond_edge(scene, eye, at, radius, first, last, turn, u)
-        inside -= beyond
-        share += met - beyond
-        if inside < _f4(MOSTLY):
-            return _f4(0.0)
+            cut = third
+        share += _met_beyond(scene, eye, at, radius, cut, u)
     return share
 
 
@@ -260,7 +206,7 @@ def _factor_by_waiting(scene, eye, at, radius, triangle, key, enough):
             continue
         tried += _f4(1.0)
         found = _f4(1.0)
-        if not _holds(triangle, x, y):
+        if not holds(triangle, x, y):
             found = _surface(scene, eye, at, x, y, radius)
         if found > _f4(0.0):
             met += 1
@@ -276,7 +222,7 @@ def over_covered(scene, eye, at, radius, enough):
         return _f4(1.0)
     triangle = _triangle_of(scene, at, radius)
     a, b, c = triangle.a, triangle.b, triangle.c
-    if triangle.known and _clears(a, b) and _clears(b, c) and _clears(c, a):
+    if triangle.known and clears(a, b) and clears(b, c) and clears(c, a):
         return _f4(1.0)
     # What many rays get must not depend on whose sample asks first.
     index = _u4(eye.index) if at.prim >= 0 else _u4(0)
