@@ -13,8 +13,6 @@ from pmviewer.settings.access import Settings, with_values
 GUIDED_FROM = 100.0
 """CPU seconds from which guided emission is worth its trial: its first passes are the dearest."""
 
-CORNERS_FROM = 6.0
-"""The same of second gathers beside the irradiance cache: below, the trial's picture would be too small."""
 RECORDS, EDGES = 1.1, 1.25
 """What errors of ways with records, and without second gathers, count as (`Candidate.overlooked`). Records alone were
 chosen in a quarter of a living room's trials, promised as little as with second gathers and 1 % too bright: 1.4 to 4
@@ -79,14 +77,15 @@ glass_egg; gather with the cache: 0.45, 0.64, 0.53, 0.87, office 0.81. Within me
 marble."""
 THICKER = {"estimate.flatness": 0.3}
 """Beside a gather, whose rays average what they meet: photons of the next facet make up for what a disc has beyond the
-edge. relMSE after 12 passes over that of thin discs, when those were whole: 0.53 in cornell_fractal, 0.97 in cornell_diffuse and
-corner_room, 0.99 in museum, 1.00 in eight others. Shown directly, they blur what is finer than the radius."""
+edge. relMSE after 8 passes over that of thin discs: 0.75 in cornell_fractal, 0.99 to 1.00 in museum, corner_room and
+colonnade. Shown directly, they blur what is finer than the radius."""
 CORNERS = {"gather.secondary": 2.0}
-"""Gather rays that end within two radii gather again, so that no disc takes light from around a corner: relMSE of a model
-of bricks in the same time 0.7 times that without (its picture 0.8 % too dark instead of 1.9 %), of a staircase and of a
-hall behind a door 0.98 to 1.02; with five radii `cornell_diffuse` took 5 % longer and none was better. With the irradiance cache records may cost
-twice as much: a way of its own. What either cache lacks by comparison is known to the trial as the bias of
-interpolation."""
+"""Gather rays that end within two radii gather again, so that no disc takes light from around a corner. relMSE in the
+same time over that without: a model of bricks 0.7, plain gather (its picture 0.8 % too dark instead of 1.9 %), a
+staircase and a hall behind a door 0.98 to 1.02; after as many passes, which cost 3 % more, cornell_fractal 0.93,
+colonnade 0.96, corner_room and museum 0.99. Up to five radii none was better, and `cornell_diffuse` took 5 % longer.
+Without them the irradiance cache was chosen for a model of bricks, promised 6e-5 and had 2e-4. What the cache lacks by
+comparison is known to the trial as the bias of interpolation."""
 FARTHER_NAME, FARTHER = "gather with second gathers farther out", {"gather.secondary": 20.0}
 LESS_BIAS, MORE_COST = 0.5, 1.08
 """The same up to twenty radii, and what that leaves of the squared bias of look-ups and costs in that model of bricks
@@ -98,9 +97,8 @@ the same time in all bundled scenes tried, from 2 to 64 passes and from 64² to 
 shows."""
 CACHE = Candidate("gather with irradiance cache", {**GATHER.values, "gather.cache": "on", **WIDE_RECORDS})
 CACHE_CORNERS = Candidate("gather with irradiance cache and second gathers", {**CACHE.values, **CORNERS})
-"""Without THICKER: no look-up is near an edge. In a living room under a sky the cache alone, with thick discs, was
-wrong by 0.018 (squared, relative; 0.008 with usual ones), with second gathers by 0.0038, and 0.0011 with usual
-discs."""
+"""Without THICKER: no look-up is near an edge. In a living room under a sky records with thick discs were wrong by
+0.018 (squared, relative), with second gathers by 0.0038, and 0.0011 with usual discs."""
 PATH = Candidate("path", {"render.method": "path"})
 NEAREST = {"estimate.lookup": "nearest"}
 """Where photons aim at what is small on a stage they are a hundred times as dense there, and no radius suits both that
@@ -127,15 +125,14 @@ def candidates(
     if not traits.stores(glossy):
         left_out.append(("gather", "no surface stores photons"))
         return [progressive, *_paths(traits, left_out)], left_out
-    gather, cache, corners = GATHER.having(THICKER), CACHE.having(THICKER), CACHE_CORNERS
+    gather, cache = GATHER.having(THICKER), CACHE_CORNERS
     if not traits.lit_media:
         gather = gather.having(CORNERS)
-        gather, cache, corners = (way.having(caustics, *why) for way in (gather, cache, corners))
+        gather, cache = (way.having(caustics, *why) for way in (gather, cache))
     found = [progressive, gather]
     if aims:
         one_radius = replace(progressive.having(ONE_RADIUS), name=ONE_RADIUS_NAME)
-        progressive, *others = (way.having(NEAREST, WHY_NEAREST) for way in (progressive, gather, cache, corners))
-        gather, cache, corners = others
+        progressive, gather, cache = (way.having(NEAREST, WHY_NEAREST) for way in (progressive, gather, cache))
         found = [progressive, one_radius, gather]
     if traits.lit_media:
         left_out.append(("irradiance cache", "it does not know of media that scatter or emit light"))
@@ -143,10 +140,6 @@ def candidates(
         left_out.append(("irradiance cache", "no diffuse surface"))
     else:
         found.append(cache)
-        if seconds < CORNERS_FROM:
-            left_out.append((CACHE_CORNERS.name, f"its trial costs too much of less than {CORNERS_FROM:g} CPU s"))
-        else:
-            found.append(corners)
     if traits.n_lights < MANY_LIGHTS:
         left_out.append(("importance", f"fewer than {MANY_LIGHTS} lights: photons mostly reach what is seen"))
     elif apart:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from pmviewer.engine.auto.bias import Bias, way_of
-from pmviewer.engine.auto.candidates import CACHE, PROGRESSIVE, SHOWN, Candidate, candidates
+from pmviewer.engine.auto.candidates import CACHE_CORNERS, PROGRESSIVE, SHOWN, Candidate, candidates
 from pmviewer.engine.auto.measured import Measured, Numbers, Trial, Widths
 from pmviewer.engine.auto.model import BETTER, FEWEST, Option, bias_of, in_time, numbers_for, to_error
 from pmviewer.engine.auto.runs import TooDearError
@@ -117,7 +117,7 @@ def _by_traits(opened: OpenScene, base: Settings, found: list[Candidate], why: s
     """Without a trial, `why`: in scenes without mirrors and glass the irradiance cache, else the default method."""
     traits = opened.traits
     plain = not traits.follows(base.photons.glossy) and traits.has_diffuse and not traits.lit_media
-    suits = CACHE if plain and not traits.glossy_roughness else PROGRESSIVE
+    suits = CACHE_CORNERS if plain and not traits.glossy_roughness else PROGRESSIVE
     way = next(candidate for candidate in found if candidate.is_like(suits))
     return Choice(way.name, assignments(way.values), math.nan, 0.0, (f"{way.name}: {why}", *way.said, *said))
 
