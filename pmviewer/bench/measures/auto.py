@@ -57,7 +57,8 @@ CHOSEN_WAYS = (
     "several lights, the choice of lights by distance, how noise is taken to fall, how wide radii that wait may be, "
     "what photons shown directly have to promise, how few light samples are preferred, and how many photons look-ups "
     "of maps that are shown hold at first were chosen with these scenes too, and how wide gather rays' look-ups are "
-    "where photons lie far apart with four of them"
+    "where photons lie far apart with four of them, how the covered part of discs is told with cornell_diffuse, and "
+    "what bias noise may hide with four of them"
 )
 """CHANNEL_ROULETTE, LIGHTS_CAUSTICS, THICKER and WIDE_RECORDS of `pmviewer.engine.auto.candidates`, SEVERAL of
 `pmviewer.render.direct.samples`, the automatic `direct.choice`, the powers and EVEN of `pmviewer.engine.auto.model`,

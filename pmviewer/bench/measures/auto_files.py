@@ -45,14 +45,16 @@ CHOSEN = (
     "staircase, what fewer photons have to promise with a living room, a staircase, Veach's room and three boxes, "
     "how far look-ups near edges are trusted with the living room, from how many times as many on photons aim at what "
     "is small with a ship under a dome, a coated torus, rings and two boxes, where the nearest photons are looked up, "
-    "and how many, with the ship, a coffee pot and four random stages, and what photons shown directly have to promise "
-    "with all of them"
+    "and how many, with the ship, a coffee pot and four random stages, how the covered part of discs is told with the "
+    "bricks and a bathroom, how far second gathers go with the bricks, a staircase and a hall, and what photons shown "
+    "directly have to promise with all of them"
 )
-"""CORNERS, CACHE_CORNERS, LESS_BIAS, MORE_COST, RECORDS, EDGES, SHOWN and NEAREST of `pmviewer.engine.auto.candidates`,
-`pmviewer.render.direct.by_lobes`, HIDDEN of `pmviewer.engine.auto.widths`, `pmviewer.render.adaptive`, GATHERED_ORDER
-and STEADY of `pmviewer.engine.auto.bias`, the powers of `pmviewer.engine.auto.model` and `measured`, HELD and MOST of
-`pmviewer.engine.auto.sparse`, LEAST_GAIN of `pmviewer.photons.projection.aim`, FEWER_PHOTONS of
-`pmviewer.engine.auto.choose`, and NEIGHBOURS of `pmviewer.engine.look_up_plan`, said in the targets' own lines."""
+"""ENOUGH and MOSTLY of `pmviewer.render.covered`, CORNERS, CACHE_CORNERS, LESS_BIAS, MORE_COST, RECORDS, EDGES, SHOWN
+and NEAREST of `pmviewer.engine.auto.candidates`, `pmviewer.render.direct.by_lobes`, HIDDEN of
+`pmviewer.engine.auto.widths`, `pmviewer.render.adaptive`, GATHERED_ORDER and STEADY of `pmviewer.engine.auto.bias`, the
+powers of `pmviewer.engine.auto.model` and `measured`, HELD and MOST of `pmviewer.engine.auto.sparse`, LEAST_GAIN of
+`pmviewer.photons.projection.aim`, FEWER_PHOTONS of `pmviewer.engine.auto.choose`, and NEIGHBOURS of
+`pmviewer.engine.look_up_plan`, said in the targets' own lines."""
 
 
 def error_against(image: NDArray[Any], references: NDArray[np.float64]) -> float:

@@ -69,9 +69,13 @@ powers of `model` and `measured`; that FEWER_PHOTONS of `choose` does not count 
 HELD = "how many photons look-ups of maps that are shown hold at first, and how few trajectories tell it"
 """HELD, CAUSTIC_HELD and FEW_TRACED of `pmviewer.engine.stages.spread`: with all of `SCENES`, and for every method."""
 WITH_EDGES = ("cornell_diffuse", "cornell_caustic", "rooms_10x10")
-EDGES = "how many samples pixels with edges have, and gather rays without a record of the cache"
+EDGES = (
+    "how many samples pixels with edges have, gather rays without a record of the cache, how the covered part of discs "
+    "is told, how far second gathers go, and what bias noise may hide"
+)
 """EDGE_RAYS of `pmviewer.engine.method`, MOST_EDGED of `pmviewer.render.edges` and CACHE_RAYS of
-`pmviewer.engine.stages.irradiance_cache`: with `WITH_EDGES` among others."""
+`pmviewer.engine.stages.irradiance_cache`, ENOUGH of `pmviewer.render.covered`, CORNERS of
+`pmviewer.engine.auto.candidates`, HIDDEN of `pmviewer.engine.auto.widths`: with `WITH_EDGES` among others."""
 AUTOMATIC_BUDGET = 8.0
 """Of the curves by what automatic mode chooses, over their target's seconds."""
 
