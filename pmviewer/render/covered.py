@@ -23,6 +23,7 @@ from pmviewer.kernels.accel.opacity import lets_pass, over_opacity
 from pmviewer.kernels.bsdf.scattering import STORED, bsdf_at, keeps
 from pmviewer.kernels.compile.jit import device
 from pmviewer.kernels.compile.specialise import specialised
+from pmviewer.kernels.dimensions import COVERED_FILTER_SALT, COVERED_SALT
 from pmviewer.kernels.media.medium import has_media
 from pmviewer.kernels.memory import bits_of_float
 from pmviewer.kernels.random import hash3, unit_float
@@ -196,13 +197,13 @@ def _factor_by_waiting(scene, eye, at, radius, triangle, key, enough):
     while met < enough and tried < most:
         k += _u4(1)
         # Points that fill the disc evenly would be met too soon: after half of their distance in the mean.
-        u = hash3(key, k, _u4(1))
+        u = hash3(key, k, _u4(COVERED_SALT))
         x, y = _f4(_u4(u & _u4(0xFFFF))) * _UNIT - _f4(1.0), _f4(_u4(u >> _u4(16))) * _UNIT - _f4(1.0)
         w = _weight(eye, x, y)
         if eye.filter == CONSTANT:
             if w == _f4(0.0):
                 continue
-        elif unit_float(hash3(u, k, _u4(2))) * filter_weight(eye.filter, eye.cone_k, _f4(0.0)) >= w:
+        elif unit_float(hash3(u, k, _u4(COVERED_FILTER_SALT))) * filter_weight(eye.filter, eye.cone_k, _f4(0.0)) >= w:
             continue
         tried += _f4(1.0)
         found = _f4(1.0)
