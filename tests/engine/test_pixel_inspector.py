@@ -26,6 +26,8 @@ SIZE = 24
 PASS = {"photons": {"N": 20_000}, "render": {"method": "progressive", "outline_rays": 0}}
 DIFFUSE = ((12, 20), (3, 12), (20, 12), (12, 2))
 """Pixels that see the floor, the red and the green wall, and the ceiling."""
+AT_EDGES = ((6, 0),)
+"""Such whose look-ups reach beyond an edge."""
 
 
 @pytest.fixture
@@ -50,7 +52,7 @@ def test_the_list_is_the_naive_estimate_of_the_pixel(pool):
     renderer.step()
     maps = renderer.latest.maps.photons
     checked, covered = 0, []
-    for x, y in DIFFUSE:
+    for x, y in (*DIFFUSE, *AT_EDGES):
         told = report(renderer, x, y)
         planes = renderer.film.planes()[y, x]
         assert told.terms == pytest.approx(planes[:15].reshape(5, 3), rel=1e-6)
