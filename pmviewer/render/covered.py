@@ -3,10 +3,11 @@
 A part of a look-up's disc lies beyond the edge of the surface, in a wall, or on what stores no photons. None are found
 there, and the photons' power over the area of the disc is too little: edges of surfaces, corners of rooms, and small
 things come out dark, in a rim as wide as the radius. Power over the area that is covered is right as far as the light
-is even. The factor is the
-reciprocal of the share that is covered. Where the triangle that the look-up is made on covers most of it, its edges
-tell how much, and short rays through the disc look for surfaces beyond them. Elsewhere points of the disc are drawn
-until some of them are covered: how many it takes, over that number, has the reciprocal as its mean.
+is even.
+
+The factor is the reciprocal of the share that is covered. Where the triangle that the look-up is made on covers most of
+the disc, its edges tell how much, and short rays through the disc look for surfaces beyond them. Elsewhere points of
+the disc are drawn until some of them are covered: how many it takes, over that number, has the reciprocal as its mean.
 
 A place counts where the photons of a look-up would: within the disc and its thickness, on a surface that faces like the
 place (`pmviewer.maps.search.sides`) and stores photons.
