@@ -148,9 +148,10 @@ def _to_error(m: Measured, error: float) -> list[Option]:
 
 def _picked(found: list[Option], promised: Callable[[Option], float], fewer: float = 1.0, shown: float = 1.0) -> Option:
     """The one that promises least, fewer photons than usual being counted `fewer` times, and photons shown directly
-    `shown` times; of ways to gather, so is bias that a trial overlooks (`Candidate.overlooked`). Of its
-    candidate the numbers that `_preference` likes best among those that are hardly worse: those of two trials are then
-    the same more often. The default unless another is clearly better."""
+    `shown` times. Where that is a gather, it is the one that promises least with the bias that a trial overlooks
+    (`Candidate.overlooked`), unless what does not gather then promises less. Of its candidate the numbers that
+    `_preference` likes best among those that are hardly worse: those of two trials are then the same more often. The
+    default unless another is clearly better."""
 
     def of(option: Option) -> float:
         few = option.numbers.N < _DEFAULT.N
