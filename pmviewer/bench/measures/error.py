@@ -71,11 +71,12 @@ HELD = "how many photons look-ups of maps that are shown hold at first, and how 
 WITH_EDGES = ("cornell_diffuse", "cornell_caustic", "rooms_10x10")
 EDGES = (
     "how many samples pixels with edges have, gather rays without a record of the cache, how the covered part of discs "
-    "is told, how far second gathers go, and what bias noise may hide"
+    "is told, how far second gathers go, how wide radii may be, and what bias noise may hide"
 )
 """EDGE_RAYS of `pmviewer.engine.method`, MOST_EDGED of `pmviewer.render.edges` and CACHE_RAYS of
 `pmviewer.engine.stages.irradiance_cache`, ENOUGH of `pmviewer.render.covered`, CORNERS of
-`pmviewer.engine.auto.candidates`, HIDDEN of `pmviewer.engine.auto.widths`: with `WITH_EDGES` among others."""
+`pmviewer.engine.auto.candidates`, SHOWN_WIDTHS of `pmviewer.engine.auto.model`, HIDDEN of
+`pmviewer.engine.auto.widths`: with `WITH_EDGES` among others."""
 AUTOMATIC_BUDGET = 8.0
 """Of the curves by what automatic mode chooses, over their target's seconds."""
 
